@@ -1,0 +1,176 @@
+# groomd: `make run` and `make test` do everything from a bare Debian 12 machine.
+#
+#   make            groomd, groom-worker, groomctl and libgroom in build/
+#   make run        a daemon that has fitted the bundled sample, and the address to open
+#   make test       lint, unit, property, fuzz corpus, API and end-to-end tests
+#   make bench      a table of figures, and build/bench.json
+#   make asan tsan  the tests under AddressSanitizer and ThreadSanitizer
+#   make fuzz       libFuzzer on every parser, FUZZ_SECONDS each
+#   make lint       include directions, cppcheck, shell and JSON syntax
+#   make install    into PREFIX (/usr/local), DESTDIR honoured
+#
+# BUILD names the output folder, VARIANT its flags (release, asan, tsan).
+
+VARIANT ?= release
+BUILD   ?= build$(if $(filter-out release,$(VARIANT)),/$(VARIANT))
+PREFIX  ?= /usr/local
+FUZZ_SECONDS ?= 60
+
+WARNINGS = -Wall -Wextra -Werror -Wshadow -Wpointer-arith -Wstrict-prototypes -Wmissing-prototypes \
+           -Wvla -Wwrite-strings -Wformat=2 -Wno-unused-parameter
+FLAGS_release = -O3 -g -fno-math-errno
+FLAGS_asan    = -O1 -g -fno-math-errno -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer
+FLAGS_tsan    = -O1 -g -fno-math-errno -fsanitize=thread -fno-omit-frame-pointer
+# No contraction: the scalar, AVX2 and AVX-512 builds of one kernel must give the same bits.
+CFLAGS_ALL = -std=c11 -D_GNU_SOURCE -fPIC -pthread -ffp-contract=off -fvisibility=default \
+             $(WARNINGS) $(FLAGS_$(VARIANT)) $(CFLAGS)
+INCLUDES   = -Ilib/include -Ilib -I. -Iproto -Iserver $(CFLAGS_PACKAGES)
+# Packages may arrive in this very make run, so they are asked for when first used, once.
+CFLAGS_PACKAGES = $(eval CFLAGS_PACKAGES := $(shell pkg-config --cflags libcjson libpng zlib libmicrohttpd sqlite3 libcurl openssl qhull_r 2>/dev/null))$(CFLAGS_PACKAGES)
+LIBS_LIB    = -lflann -llz4 -lopenblas -lembree3 -lqhull_r -lpng -lz -lcjson -lm
+LIBS_SERVER = -lmicrohttpd -lsqlite3 -lcurl -lcrypto
+
+find_c = $(sort $(shell find $(1) -name '*.c' 2>/dev/null))
+objects = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
+
+LIB_SOURCES    := $(call find_c,lib)
+PROTO_SOURCES  := $(call find_c,proto)
+WORKER_SOURCES := $(call find_c,server/worker)
+DAEMON_SOURCES := $(filter-out $(WORKER_SOURCES),$(call find_c,server))
+CLIENT_SOURCES := $(call find_c,client/groomctl)
+MAINS          := server/groomd.c server/worker/main.c client/groomctl/main.c
+SUPPORT_SOURCES:= $(call find_c,tests/support)
+UNIT_TESTS     := $(patsubst tests/%.c,$(BUILD)/tests/%,$(call find_c,tests/unit tests/property))
+BENCHES        := $(patsubst tests/%.c,$(BUILD)/tests/%,$(call find_c,tests/bench))
+FUZZERS        := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
+
+LIBGROOM = $(BUILD)/libgroom.a
+PROTO_A  = $(BUILD)/libproto.a
+# The daemon's and the client's parts without their main(): what tests link.
+PARTS_A  = $(BUILD)/libparts.a
+PROGRAMS = $(foreach m,$(wildcard $(MAINS)),$(BUILD)/$(PROGRAM_OF_$(subst /,_,$(m))))
+PROGRAM_OF_server_groomd.c = groomd
+PROGRAM_OF_server_worker_main.c = groom-worker
+PROGRAM_OF_client_groomctl_main.c = groomctl
+
+.PHONY: all setup programs lib run test unit check-all bench asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
+.DEFAULT_GOAL := all
+
+# Set-up runs first, in a make of its own, so that pkg-config sees what it installed.
+all: setup
+	@$(MAKE) --no-print-directory programs
+
+setup:
+	@deploy/setup.sh
+
+lib: $(LIBGROOM) $(BUILD)/libgroom.so
+programs: lib $(PROGRAMS)
+
+$(BUILD)/obj/%.o: %.c
+	@mkdir -p $(@D)
+	$(CC) $(CFLAGS_ALL) $(INCLUDES) -MMD -MP -c $< -o $@
+
+$(LIBGROOM): $(call objects,$(LIB_SOURCES))
+	@mkdir -p $(@D); rm -f $@
+	$(AR) rcs $@ $^
+
+$(BUILD)/libgroom.so: $(call objects,$(LIB_SOURCES))
+	@mkdir -p $(@D)
+	$(CC) $(CFLAGS_ALL) -shared -Wl,-soname,libgroom.so -o $@ $^ $(LDFLAGS) $(LIBS_LIB)
+
+$(PROTO_A): $(call objects,$(PROTO_SOURCES))
+	@mkdir -p $(@D); rm -f $@
+	$(AR) rcs $@ $^
+
+$(PARTS_A): $(call objects,$(filter-out $(MAINS),$(DAEMON_SOURCES) $(WORKER_SOURCES) $(CLIENT_SOURCES)))
+	@mkdir -p $(@D); rm -f $@
+	$(AR) rcs $@ $^
+
+$(BUILD)/groomd: $(call objects,server/groomd.c $(filter-out $(MAINS),$(DAEMON_SOURCES)))
+$(BUILD)/groom-worker: $(call objects,$(WORKER_SOURCES))
+$(BUILD)/groomctl: $(call objects,$(CLIENT_SOURCES))
+$(BUILD)/groomd $(BUILD)/groom-worker $(BUILD)/groomctl: $(PROTO_A) $(LIBGROOM)
+	$(CC) $(CFLAGS_ALL) -o $@ $(filter %.o,$^) $(PROTO_A) $(LIBGROOM) $(LDFLAGS) $(LIBS_SERVER) $(LIBS_LIB)
+
+# --- tests ---------------------------------------------------------------------
+
+$(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(call objects,$(SUPPORT_SOURCES)) $(PARTS_A) $(PROTO_A) $(LIBGROOM)
+	@mkdir -p $(@D)
+	$(CC) $(CFLAGS_ALL) -o $@ $< $(call objects,$(SUPPORT_SOURCES)) $(PARTS_A) $(PROTO_A) $(LIBGROOM) $(LDFLAGS) \
+	    $(LIBS_SERVER) $(LIBS_LIB) -lcheck -lsubunit -lrt
+
+tests: $(UNIT_TESTS)
+
+test: setup
+	@$(MAKE) --no-print-directory check-all
+
+check-all: programs tests fuzz-corpus node-packages
+	@$(MAKE) --no-print-directory lint
+	@BUILD=$(BUILD) tests/run.sh
+
+unit: programs tests
+	@BUILD=$(BUILD) tests/run.sh unit
+
+api e2e: programs node-packages
+	@BUILD=$(BUILD) tests/run.sh $@
+
+node-packages: tests/node_modules/.installed
+tests/node_modules/.installed: tests/package.json tests/package-lock.json
+	@echo "setup: installing the npm packages of tests/package-lock.json"
+	cd tests && npm ci --no-audit --no-fund --ignore-scripts
+	@touch $@
+
+asan tsan:
+	@deploy/setup.sh
+	@$(MAKE) --no-print-directory VARIANT=$@ programs tests node-packages
+	@BUILD=build/$@ VARIANT=$@ tests/run.sh
+
+# --- fuzzing --------------------------------------------------------------------
+
+# Every parser under libFuzzer with AddressSanitizer (clang). The corpus of each is replayed by
+# `make test` through the same entry point, built by the ordinary compiler.
+FUZZ_BUILD = build/fuzz
+$(FUZZ_BUILD)/fuzz_%: tests/fuzz/fuzz_%.c $(LIB_SOURCES) $(wildcard lib/*/*.h lib/include/groom/*.h)
+	@mkdir -p $(@D)
+	clang -std=c11 -D_GNU_SOURCE -O1 -g -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=undefined \
+	    $(INCLUDES) -o $@ $< $(LIB_SOURCES) $(LIBS_LIB) -pthread
+
+fuzz: setup
+	@$(MAKE) --no-print-directory $(addprefix $(FUZZ_BUILD)/fuzz_,$(FUZZERS))
+	@set -e; for f in $(FUZZERS); do \
+	    mkdir -p build/fuzz/corpus/$$f; echo "fuzz: $$f for $(FUZZ_SECONDS) s"; \
+	    $(FUZZ_BUILD)/fuzz_$$f -max_total_time=$(FUZZ_SECONDS) -timeout=10 -rss_limit_mb=1024 -print_final_stats=1 \
+	        build/fuzz/corpus/$$f tests/fuzz/corpus/$$f; \
+	done
+
+fuzz-corpus: $(addprefix $(BUILD)/tests/fuzz/replay_,$(FUZZERS))
+$(BUILD)/tests/fuzz/replay_%: $(BUILD)/obj/tests/fuzz/fuzz_%.o $(BUILD)/obj/tests/fuzz/replay.o $(LIBGROOM)
+	@mkdir -p $(@D)
+	$(CC) $(CFLAGS_ALL) -o $@ $(filter %.o,$^) $(LIBGROOM) $(LDFLAGS) $(LIBS_LIB)
+
+# --- benchmarks, lint, run, install -------------------------------------------------
+
+bench: setup
+	@$(MAKE) --no-print-directory programs node-packages $(BENCHES)
+	@BUILD=$(BUILD) tests/bench/run.sh
+
+lint:
+	@tests/lint.sh
+
+run: setup
+	@$(MAKE) --no-print-directory programs
+	@BUILD=$(BUILD) deploy/run.sh
+
+install: programs
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include/groom $(DESTDIR)$(PREFIX)/share/groomd
+	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
+	install -m 644 $(LIBGROOM) $(DESTDIR)$(PREFIX)/lib
+	install -m 755 $(BUILD)/libgroom.so $(DESTDIR)$(PREFIX)/lib
+	install -m 644 lib/include/groom/*.h $(DESTDIR)$(PREFIX)/include/groom
+	install -m 644 proto/openapi.yaml $(DESTDIR)$(PREFIX)/share/groomd
+
+clean:
+	rm -rf build
+
+.SECONDARY:
+-include $(shell find $(BUILD)/obj -name '*.d' 2>/dev/null)

@@ -1,0 +1,233 @@
+/* The procedural groom: guides, instancing and a chain of operators.
+ *
+ * Chang et al. 2025, "Transforming Unstructured Hair Strands into Procedural
+ * Hair Grooms", Eq. 1: x = P_theta(instance(g)). This is the struct behind the
+ * groom document (groom/document.h) and all that evaluation needs.
+ *
+ * Everything is in metres, y up, root first. Every strand and every guide has
+ * the same number of vertices m. */
+#ifndef GROOM_GROOM_H
+#define GROOM_GROOM_H
+
+#include <stdint.h>
+
+#include "groom/context.h"
+#include "groom/diag.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* --- operators ------------------------------------------------------------ */
+
+/* Appendix A. Which random numbers each draws, and for how many:
+ * X(constant, name in documents, number of random arrays, drawn for each operator guide (1) or strand (0)) */
+#define GROOM_OPERATOR_LIST(X)                                                                     \
+    X(GROOM_OPERATOR_SCALE, "scale", 1, 0)                                                         \
+    X(GROOM_OPERATOR_BEND,  "bend",  1, 0)                                                         \
+    X(GROOM_OPERATOR_CURL,  "curl",  2, 1)                                                         \
+    X(GROOM_OPERATOR_CLUMP, "clump", 0, 0)                                                         \
+    X(GROOM_OPERATOR_FRIZZ, "frizz", 1, 0)
+
+typedef enum groom_operator_type {
+#define GROOM_OPERATOR_ENUM(name, slug, n_random, per_guide) name,
+    GROOM_OPERATOR_LIST(GROOM_OPERATOR_ENUM)
+#undef GROOM_OPERATOR_ENUM
+    GROOM_OPERATOR_COUNT
+} groom_operator_type;
+
+#define GROOM_OPERATOR_MAX_PARAMETERS 4
+#define GROOM_OPERATOR_MAX_RANDOM 2
+
+/* Parameters sit in one array, in the order of groom_operator_parameters(type):
+ *   scale  random_scale (eta)
+ *   bend   angle (theta, radians), start (zeta, 0..1)
+ *   curl   radius (rho, m), frequency (turns per m), random_frequency (turns per m), start (zeta)
+ *   clump  profile (a)
+ *   frizz  frequency (omega, per m), amplitude (alpha, m)
+ * so that a fit, a gradient, a slider and a JSON object walk the same list. */
+struct groom_operator {
+    groom_operator_type type;
+    int enabled;                /* 0: skipped by evaluation */
+    uint64_t seed;              /* from which its random numbers were drawn */
+    uint32_t id;                /* stream of its random numbers: unique in the groom, stays when the chain is reordered */
+    float parameter[GROOM_OPERATOR_MAX_PARAMETERS];
+    float *random[GROOM_OPERATOR_MAX_RANDOM]; /* [n_strands] or [n_operator_guides]; NULL beyond the type's number */
+};
+
+struct groom_operator_parameter {
+    const char *name;       /* "radius" */
+    const char *unit;       /* "m", "rad", "1/m", "" */
+    float minimum, maximum; /* what a document may hold */
+    float slider_maximum;   /* a sensible range in a user interface */
+    float initial;          /* the documented starting value */
+    const char *help;       /* one sentence for a groomer */
+};
+
+const char *groom_operator_name(groom_operator_type type);
+/* The parameters of a type, and their number in *n. Static. */
+const struct groom_operator_parameter *groom_operator_parameters(groom_operator_type type, uint32_t *n);
+/* returns GROOM_OK or GROOM_EINVAL with the list of names in diag */
+GROOM_MUST_CHECK groom_status groom_operator_parse(const char *name, groom_operator_type *type,
+                                                   struct groom_diag *diag);
+uint32_t groom_operator_random_arrays(groom_operator_type type);
+int groom_operator_random_per_guide(groom_operator_type type);
+
+/* --- the groom ------------------------------------------------------------ */
+
+/* Where scalp coordinates came from; recorded in the document. */
+typedef enum groom_scalp_source {
+    GROOM_SCALP_MESH_UV,  /* the head's own texture coordinates */
+    GROOM_SCALP_COMPUTED, /* computed on a head that has none */
+    GROOM_SCALP_ROOTS,    /* from the roots alone; no head was given */
+    GROOM_SCALP_FILE      /* the strands' file brought them */
+} groom_scalp_source;
+
+struct groom {
+    char name[128];
+    uint32_t n_strands;         /* n */
+    uint32_t n_vertices;        /* m, of each strand and guide, at least 3 */
+    uint32_t n_guides;          /* n_g */
+    uint32_t n_operator_guides; /* n_gop */
+    uint32_t n_instancing;      /* k, guides that a strand blends */
+    groom_scalp_source scalp;
+
+    float (*roots)[3];          /* [n] */
+    float (*root_uv)[2];        /* [n] */
+    float (*guides)[3];         /* [n_g * m], guide-major; undeformed */
+    float (*guide_uv)[2];       /* [n_g] */
+    uint32_t *instancing_guide; /* [n * k] guides of a strand */
+    float *instancing_weight;   /* [n * k] their weights; each strand's sum to 1 */
+    uint32_t *operator_guide;   /* [n_gop] index into guides */
+    uint32_t *operator_guide_of;/* [n] index into operator_guide */
+
+    uint32_t n_operators;
+    struct groom_operator *operators; /* [n_operators], in the order of the chain */
+    const struct groom_allocator *allocator; /* owns the arrays */
+};
+
+struct groom_shape {
+    uint32_t n_strands, n_vertices, n_guides, n_operator_guides, n_instancing;
+};
+
+/* A groom of this shape with zeroed arrays and no operators. Owned by the caller.
+ * returns  GROOM_OK, GROOM_EINVAL (a count that is 0, m < 3, k > n_g, n_gop > n_g), GROOM_ENOMEM */
+GROOM_MUST_CHECK groom_status groom_create(struct groom_shape shape, const struct groom_context *context,
+                                           struct groom **groom, struct groom_diag *diag);
+void groom_destroy(struct groom *groom); /* takes NULL */
+/* A deep copy. */
+GROOM_MUST_CHECK groom_status groom_clone(const struct groom *groom, const struct groom_context *context,
+                                          struct groom **copy, struct groom_diag *diag);
+
+/* Everything a groom must hold to be evaluated: indices in range, weights finite and summing to 1
+ * (within 1e-3), parameters in range, random numbers in range, points finite.
+ * returns  GROOM_OK or GROOM_EINVAL with the JSON pointer of the culprit */
+GROOM_MUST_CHECK groom_status groom_validate(const struct groom *groom, struct groom_diag *diag);
+
+/* --- the chain ------------------------------------------------------------ */
+
+/* Insert an operator at `index` (0..n_operators) with its initial parameters, an id of its own, and
+ * random numbers drawn from `seed`. */
+GROOM_MUST_CHECK groom_status groom_insert_operator(struct groom *groom, uint32_t index,
+                                                    groom_operator_type type, uint64_t seed,
+                                                    struct groom_diag *diag);
+GROOM_MUST_CHECK groom_status groom_remove_operator(struct groom *groom, uint32_t index, struct groom_diag *diag);
+GROOM_MUST_CHECK groom_status groom_move_operator(struct groom *groom, uint32_t from, uint32_t to,
+                                                  struct groom_diag *diag);
+/* Draw an operator's random numbers anew: a function of (seed, operator id, strand or operator guide). */
+void groom_draw_random(struct groom *groom, struct groom_operator *op, uint64_t seed);
+
+/* --- instancing ------------------------------------------------------------ */
+
+/* Eq. 3: the k guides nearest to each root in scalp coordinates and their Gaussian weights
+ * exp(-d^2 / sigma^2), normalised. Fills instancing_guide and instancing_weight; exact and
+ * deterministic (ties by index). sigma <= 0: 1.5 times the median distance of a guide to its
+ * nearest guide. */
+GROOM_MUST_CHECK groom_status groom_instance_by_distance(struct groom *groom, float sigma,
+                                                         const struct groom_context *context,
+                                                         struct groom_diag *diag);
+
+/* --- evaluation ------------------------------------------------------------ */
+
+/* Strands first .. first+count-1, dense.
+ * groom    borrowed; has passed groom_validate
+ * out      [count][m][3], the caller's
+ * returns  GROOM_OK, GROOM_EINVAL (range), GROOM_ENOMEM
+ * threads  same bits for any pool and any split into ranges */
+GROOM_MUST_CHECK groom_status groom_evaluate(const struct groom *groom, uint32_t first, uint32_t count,
+                                             float (*out)[3], const struct groom_context *context,
+                                             struct groom_diag *diag);
+
+/* The gradient of a scalar with respect to everything that a fit moves (reverse mode, exact).
+ * Arrays may be NULL where not wanted. groom_gradient_create allocates all. */
+struct groom_gradient {
+    float (*guides)[3];        /* [n_g * m] */
+    float *instancing_weight;  /* [n * k], of the weights as stored (no renormalisation) */
+    struct groom_operator_gradient {
+        double parameter[GROOM_OPERATOR_MAX_PARAMETERS];
+        float *random[GROOM_OPERATOR_MAX_RANDOM]; /* like groom_operator.random */
+    } *operators;              /* [n_operators] */
+    const struct groom_allocator *allocator;
+    struct groom_shape shape;
+    uint32_t n_operators;
+};
+
+GROOM_MUST_CHECK groom_status groom_gradient_create(const struct groom *groom,
+                                                    const struct groom_context *context,
+                                                    struct groom_gradient **gradient,
+                                                    struct groom_diag *diag);
+void groom_gradient_destroy(struct groom_gradient *gradient); /* takes NULL */
+
+/* Forward and backward in one pass over the strands.
+ * strand    [count] indices of the strands to visit, or NULL for all n (then count = n)
+ * adjoint   called for each piece of strands after forward evaluation, from any thread of the pool:
+ *           reads points [n_piece][m][3] (strands piece_first.. of the visiting order) and writes
+ *           d(loss)/d(points) into d_points of the same shape
+ * gradient  overwritten
+ * threads   same bits for any pool */
+struct groom_adjoint {
+    void (*evaluate)(void *user, uint32_t piece_first, uint32_t n_piece, const float (*points)[3],
+                     float (*d_points)[3]);
+    void *user;
+};
+GROOM_MUST_CHECK groom_status groom_evaluate_gradient(const struct groom *groom, const uint32_t *strand,
+                                                      uint32_t count, struct groom_adjoint adjoint,
+                                                      struct groom_gradient *gradient,
+                                                      const struct groom_context *context,
+                                                      struct groom_diag *diag);
+
+/* --- curvature parameters of guides (Eq. 10; Crane et al. 2013) ------------- */
+
+/* Per guide: root position, root angles (2), m-1 segment lengths, m-2 curvatures of each of the
+ * two angles. The azimuth is unwrapped along the strand; the pole of the spherical coordinates is
+ * chosen per guide away from its directions, and stored. */
+struct groom_curvature_guides {
+    uint32_t n_guides, n_vertices;
+    float (*root)[3];      /* [n_g] */
+    float (*pole)[9];      /* [n_g] rotation (row-major) into the guide's own spherical frame */
+    float (*angle)[2];     /* [n_g] (polar, azimuth) of the first segment */
+    float *length;         /* [n_g][m-1] metres */
+    float (*curvature)[2]; /* [n_g][m-2] radians per metre */
+    const struct groom_allocator *allocator;
+};
+
+GROOM_MUST_CHECK groom_status groom_curvature_guides_create(uint32_t n_guides, uint32_t n_vertices,
+                                                            const struct groom_context *context,
+                                                            struct groom_curvature_guides **guides,
+                                                            struct groom_diag *diag);
+void groom_curvature_guides_destroy(struct groom_curvature_guides *guides); /* takes NULL */
+/* points [n_g][m][3] -> parameters. Segments of no length get a length floor and the neighbour's direction. */
+void groom_curvature_guides_from_points(const float (*points)[3], struct groom_curvature_guides *guides,
+                                        const struct groom_context *context);
+/* parameters -> points [n_g][m][3] */
+void groom_curvature_guides_to_points(const struct groom_curvature_guides *guides, float (*points)[3],
+                                      const struct groom_context *context);
+/* d(loss)/d(points) -> d(loss)/d(angle, length, curvature); gradient's root and pole are left alone. */
+void groom_curvature_guides_gradient(const struct groom_curvature_guides *guides,
+                                     const float (*d_points)[3], struct groom_curvature_guides *gradient,
+                                     const struct groom_context *context);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

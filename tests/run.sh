@@ -1,0 +1,65 @@
+#!/usr/bin/env bash
+# Runs the tests and closes with one line: N passed, N failed, N skipped.
+#   tests/run.sh [unit|api|e2e ...]     all where none is named. BUILD is the build folder.
+set -uo pipefail
+cd "$(dirname "$0")/.."
+BUILD=${BUILD:-build}
+export BUILD
+kinds=("$@"); [ ${#kinds[@]} -gt 0 ] || kinds=(unit api e2e)
+mkdir -p "$BUILD/tests"
+log=$BUILD/tests/last.log; : >"$log"
+failed_programs=()
+
+run() { # name command...
+    local name=$1; shift
+    "$@" 2>&1 | tee -a "$log" | sed "s|^|$name: |"
+    [ "${PIPESTATUS[0]}" -eq 0 ] || failed_programs+=("$name")
+}
+
+run_unit() {
+    local program corpus
+    for program in "$BUILD"/tests/unit/test_* "$BUILD"/tests/property/test_*; do
+        case $program in *.d|*.o) continue ;; esac
+        [ -x "$program" ] && run "${program##*/}" "$program"
+    done
+    for program in "$BUILD"/tests/fuzz/replay_*; do
+        corpus=tests/fuzz/corpus/${program##*/replay_}
+        [ -x "$program" ] && [ -d "$corpus" ] && run "${program##*/}" "$program" "$corpus"/*
+    done
+}
+
+run_node() { # folder
+    local files=(tests/"$1"/*.test.mjs)
+    [ -e "${files[0]}" ] || return 0
+    # one file after another: each starts a daemon of its own, and the machine has two cores
+    local file
+    for file in "${files[@]}"; do run "$1/${file##*/}" node --test --test-reporter=tap "$file"; done
+}
+
+for kind in "${kinds[@]}"; do
+    case $kind in
+        unit) run_unit ;;
+        api|e2e) run_node "$kind" ;;
+        *) echo "tests/run.sh: unit, api or e2e, not $kind" >&2; exit 2 ;;
+    esac
+done
+
+# Check prints "Checks: 7, Failures: 0, Errors: 0"; node's TAP reporter "# pass 7" and "# fail 0".
+read -r passed failed skipped < <(awk '
+    /Checks: [0-9]+, Failures: [0-9]+, Errors: [0-9]+/ {
+        match($0, /Checks: [0-9]+/);   c = substr($0, RSTART + 8, RLENGTH - 8)
+        match($0, /Failures: [0-9]+/); f = substr($0, RSTART + 10, RLENGTH - 10)
+        match($0, /Errors: [0-9]+/);   e = substr($0, RSTART + 8, RLENGTH - 8)
+        p += c - f - e; b += f + e }
+    /^# pass /    { p += $3 }
+    /^# fail /    { b += $3 }
+    /^# skipped / { s += $3 }
+    /^SKIPPED: /  { s++ }
+    END { print p + 0, b + 0, s + 0 }' "$log")
+grep -h '^SKIPPED: ' "$log" | sort | uniq -c
+if [ ${#failed_programs[@]} -gt 0 ]; then
+    echo "failed: ${failed_programs[*]}"
+    [ "$failed" -gt 0 ] || failed=${#failed_programs[@]}
+fi
+echo "tests: $passed passed, $failed failed, $skipped skipped"
+[ "$failed" -eq 0 ] && [ ${#failed_programs[@]} -eq 0 ]
