@@ -22,7 +22,7 @@ declare -A allowed=(
 )
 declare -A room_of_header=(
     [status]=base [diag]=base [context]=base [random]=base
-    [mesh]=geometry [spatial]=geometry [scalp]=geometry
+    [mesh]=geometry [spatial]=geometry [scalp]=geometry [camera]=geometry
     [strands]=strands [format]=strands
     [groom]=model [document]=model
     [fit]=fit [sample]=sample [render]=render [curvature]=curvature [retarget]=retarget

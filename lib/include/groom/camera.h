@@ -1,0 +1,38 @@
+/* A pinhole camera: what a reconstruction was seen by, and what a picture is taken with.
+ *
+ * The convention is OpenCV's and COLMAP's: x right, y down, z forward, the origin of the picture
+ * at its upper left corner. A point p (metres, y up) is seen at
+ *
+ *     q = R p + t,   u = fx q.x / q.z + cx,   v = fy q.y / q.z + cy      where q.z > 0
+ *
+ * In JSON: {"name":"front","width":1024,"height":1024,"fx":..,"fy":..,"cx":..,"cy":..,
+ *           "rotation":[[3],[3],[3]],"translation":[3]}, rotation in rows. */
+#ifndef GROOM_CAMERA_H
+#define GROOM_CAMERA_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct groom_camera {
+    char name[32];
+    uint32_t width, height;  /* pixels */
+    double fx, fy, cx, cy;   /* pixels */
+    double rotation[9];      /* R, row-major, world to camera */
+    double translation[3];   /* t, metres */
+};
+
+/* A camera at `eye` that looks at `target`, upright; square pixels, the principal point in the
+ * middle, fov_y radians from the lower to the upper edge. Looking straight up or down, -z is up. */
+void groom_camera_look_at(const double eye[3], const double target[3], double fov_y, uint32_t width,
+                          uint32_t height, struct groom_camera *camera);
+
+/* Where p is seen, in pixels, and its depth q.z (metres). Returns 0 for a point behind the camera. */
+int groom_camera_project(const struct groom_camera *camera, const float p[3], double pixel[2], double *depth);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
