@@ -97,7 +97,7 @@ $(BUILD)/groomd $(BUILD)/groom-worker $(BUILD)/groomctl: $(PROTO_A) $(LIBGROOM)
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(call objects,$(SUPPORT_SOURCES)) $(PARTS_A) $(PROTO_A) $(LIBGROOM)
 	@mkdir -p $(@D)
 	$(CC) $(CFLAGS_ALL) -o $@ $< $(call objects,$(SUPPORT_SOURCES)) $(PARTS_A) $(PROTO_A) $(LIBGROOM) $(LDFLAGS) \
-	    $(LIBS_SERVER) $(LIBS_LIB) -lcheck -lsubunit -lrt
+	    $(LIBS_SERVER) $(LIBS_LIB) -lcheck -lsubunit -lrt -lm
 
 tests: $(UNIT_TESTS)
 
