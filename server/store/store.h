@@ -1,0 +1,410 @@
+/* What groomd remembers: uploads, jobs and their attempts, grooms and their revisions.
+ *
+ * One interface in front of a database that the daemon alone owns (SQLite in WAL mode with
+ * synchronous=FULL; nothing here names SQL, so that another backend fits behind it). A call that
+ * returned GROOM_OK is on the disk. A call is one transaction: after a crash it has happened or not.
+ *
+ * threads   every function may be called from any thread; calls take turns
+ * blocking  a write waits for the disk (a few ms): call from service threads, not from an event loop
+ * strings   rows own what they point to; `*_finish` releases it, takes NULL and zeroed rows, and
+ *           leaves a zeroed row. JSON is passed and kept as text.
+ * times     milliseconds since 1970 UTC; 0: it has not happened
+ * errors    GROOM_ENOSPC (disk full), GROOM_EIO, GROOM_ENOMEM, GROOM_EINTERNAL from any of them;
+ *           what a function adds to these is said there. Outputs are set only on GROOM_OK. */
+#ifndef STORE_STORE_H
+#define STORE_STORE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "groom/diag.h"
+
+#define STORE_ID_SIZE   32 /* "job_" and the like with 20 characters, and room */
+#define STORE_HASH_SIZE 65 /* SHA-256 in lower-case hexadecimal */
+
+struct store;
+
+/* Open or make the database file `path`, mend it to the present schema, check it.
+ * returns  GROOM_EFORMAT (not a database, damaged, or of a newer schema: detail says which) */
+GROOM_MUST_CHECK groom_status store_open(const char *path, struct store **store, struct groom_diag *diag);
+void store_close(struct store *store); /* takes NULL */
+
+/* A read that proves the database answers: for /readyz. */
+GROOM_MUST_CHECK groom_status store_ping(struct store *store, struct groom_diag *diag);
+
+/* --- ids and times ------------------------------------------------------------------ */
+
+/* prefix ("job_", "grm_") and 20 random characters a-z2-7 (100 bits). */
+GROOM_MUST_CHECK groom_status store_make_id(const char *prefix, char id[STORE_ID_SIZE]);
+int64_t store_now_ms(void);
+/* RFC 3339 in UTC with milliseconds: "2026-01-31T12:00:00.250Z". */
+void store_time_text(int64_t time_ms, char text[32]);
+
+/* --- pages ---------------------------------------------------------------------------- */
+
+/* Lists go from the newest to the oldest. `before` is the `next` of the page before, or 0 for the
+ * first; limit 0 means 100. A list's `next` is 0 where nothing is left. */
+struct store_page {
+    int64_t before;
+    uint32_t limit;
+};
+
+/* --- uploads: strands and heads --------------------------------------------------------- */
+
+enum store_asset_kind { STORE_STRANDS, STORE_HEAD };
+
+struct store_asset {
+    char id[STORE_ID_SIZE];       /* "str_…", "head_…" */
+    enum store_asset_kind kind;
+    char sha256[STORE_HASH_SIZE]; /* its blob */
+    uint64_t n_bytes;
+    char *format;                 /* as recognised: "hair" */
+    double unit_m;                /* metres of one unit of the file */
+    char up;                      /* 'y' or 'z' */
+    char *name;                   /* "" where none was given */
+    char *metadata;               /* JSON object of the answer: counts, bbox, warnings */
+    int64_t created_ms;
+};
+
+struct store_asset_list {
+    struct store_asset *items;
+    size_t n;
+    int64_t next;
+};
+
+/* The id of these bytes read in this way, always the same: "str_" and a hash of (sha256, format,
+ * unit_m, up). `format` is what was asked for ("" or NULL: recognise it). */
+void store_asset_id(enum store_asset_kind kind, const char *sha256, const char *format, double unit_m,
+                    char up, char id[STORE_ID_SIZE]);
+/* Insert unless a row of this id is there already; *created says which. created_ms 0 means now.
+ * Its blob must be committed before. */
+GROOM_MUST_CHECK groom_status store_asset_put(struct store *store, const struct store_asset *asset,
+                                              bool *created, struct groom_diag *diag);
+/* returns  GROOM_ENOTFOUND, also where the id is of the other kind */
+GROOM_MUST_CHECK groom_status store_asset_get(struct store *store, enum store_asset_kind kind, const char *id,
+                                              struct store_asset *asset, struct groom_diag *diag);
+GROOM_MUST_CHECK groom_status store_assets_list(struct store *store, enum store_asset_kind kind,
+                                                struct store_page page, struct store_asset_list *list,
+                                                struct groom_diag *diag);
+void store_asset_finish(struct store_asset *asset);
+void store_asset_list_finish(struct store_asset_list *list);
+
+/* --- grooms and their revisions ----------------------------------------------------------- */
+
+/* A large array of a document, stored once whatever number of revisions hold it. Documents refer to
+ * it as {"$array":"<sha256>"}. `bytes` NULL: the array is in the store already. */
+struct store_array {
+    char sha256[STORE_HASH_SIZE];
+    const void *bytes;
+    size_t n_bytes;
+};
+
+/* A revision to write; everything borrowed for the call. */
+struct store_revision_new {
+    const char *groom_id;             /* "grm_…" */
+    const char *name;                 /* of the groom from now on */
+    const char *document;             /* JSON, large arrays replaced by references */
+    const char *note;                 /* what made it: "fit", "import", "patch"; NULL: "" */
+    const struct store_array *arrays; /* every array that the document refers to */
+    size_t n_arrays;
+};
+
+struct store_revision {
+    char groom_id[STORE_ID_SIZE];
+    uint32_t number;    /* from 1 */
+    uint32_t parent;    /* 0: none */
+    uint32_t latest;    /* of the groom, when this was read */
+    char *name;         /* of the groom at this revision */
+    char *document;     /* NULL in lists */
+    char *note;
+    int64_t created_ms;
+};
+
+struct store_revision_list {
+    struct store_revision *items;
+    size_t n;
+    int64_t next;
+};
+
+struct store_groom {
+    char id[STORE_ID_SIZE];
+    char *name;
+    uint32_t latest;
+    int64_t created_ms, changed_ms;
+};
+
+struct store_groom_list {
+    struct store_groom *items;
+    size_t n;
+    int64_t next;
+};
+
+/* A new groom with revision 1.
+ * returns  GROOM_ECONFLICT (the id is taken), GROOM_EINVAL (an array without bytes is not stored) */
+GROOM_MUST_CHECK groom_status store_groom_create(struct store *store, const struct store_revision_new *revision,
+                                                 struct groom_diag *diag);
+/* The next revision of a groom; its number is expected_latest + 1, its parent expected_latest.
+ * returns  GROOM_ECONFLICT where the latest is another by now, GROOM_ENOTFOUND, GROOM_EINVAL as above */
+GROOM_MUST_CHECK groom_status store_revision_add(struct store *store, const struct store_revision_new *revision,
+                                                 uint32_t expected_latest, struct groom_diag *diag);
+/* number 0: the latest. returns  GROOM_ENOTFOUND */
+GROOM_MUST_CHECK groom_status store_revision_get(struct store *store, const char *groom_id, uint32_t number,
+                                                 struct store_revision *revision, struct groom_diag *diag);
+/* *bytes is malloc'ed, the caller's to free. returns  GROOM_ENOTFOUND */
+GROOM_MUST_CHECK groom_status store_array_get(struct store *store, const char *sha256, void **bytes,
+                                              size_t *n_bytes, struct groom_diag *diag);
+/* Without their documents. returns  GROOM_ENOTFOUND for an unknown groom */
+GROOM_MUST_CHECK groom_status store_revisions_list(struct store *store, const char *groom_id,
+                                                   struct store_page page, struct store_revision_list *list,
+                                                   struct groom_diag *diag);
+GROOM_MUST_CHECK groom_status store_grooms_list(struct store *store, struct store_page page,
+                                                struct store_groom_list *list, struct groom_diag *diag);
+void store_revision_finish(struct store_revision *revision);
+void store_revision_list_finish(struct store_revision_list *list);
+void store_groom_list_finish(struct store_groom_list *list);
+
+/* --- jobs ------------------------------------------------------------------------------------ */
+
+/*            take                succeed
+ *   queued ────────▶ running ─────────────▶ succeeded
+ *     │  ◀──────────    │ ├───────────────▶ failed        (its error, or too many attempts died)
+ *     │    requeue      │ └───────────────▶ cancelled     (once the worker has stopped)
+ *     └─────────────────────────────────▶  cancelled / failed
+ * The three on the right are end states. Only store_job_take and store_job_move change a state. */
+enum store_job_state {
+    STORE_JOB_QUEUED,
+    STORE_JOB_RUNNING,
+    STORE_JOB_SUCCEEDED,
+    STORE_JOB_FAILED,
+    STORE_JOB_CANCELLED,
+    STORE_JOB_STATES
+};
+const char *store_job_state_name(enum store_job_state state); /* "queued" */
+/* returns  GROOM_EINVAL with the list of names */
+GROOM_MUST_CHECK groom_status store_job_state_parse(const char *name, enum store_job_state *state,
+                                                    struct groom_diag *diag);
+bool store_job_state_is_end(enum store_job_state state);
+
+struct store_job {
+    char id[STORE_ID_SIZE];
+    char *kind;             /* "fit" */
+    enum store_job_state state;
+    int32_t priority;       /* larger first; then the older first */
+    int64_t queue_position; /* jobs ahead of it; -1 where it is not queued */
+    char *request;          /* JSON object: {"strands":"str_…","head":"head_…"} */
+    char *options;          /* JSON object, defaults filled in */
+    char *stage;            /* "" before the first */
+    uint32_t stage_index, stage_count;
+    double progress;        /* 0..1 */
+    double eta_s;           /* negative: unknown */
+    char *loss;             /* JSON object: the last value of each loss */
+    uint32_t attempt;       /* number of the last attempt begun; 0: none yet */
+    uint32_t n_failures;    /* attempts that died by themselves */
+    bool cancel_requested;
+    char *result, *error;   /* JSON objects or NULL */
+    int64_t created_ms, started_ms, finished_ms;
+};
+
+struct store_job_list {
+    struct store_job *items;
+    size_t n;
+    int64_t next;
+};
+
+struct store_job_new {
+    const char *id; /* from store_make_id */
+    const char *kind;
+    const char *request, *options; /* JSON objects */
+    int32_t priority;
+    const char *idempotency_key;   /* or NULL */
+    const char *request_hash;      /* of what the key stands for; with a key only */
+};
+
+/* Queue a job, unless its idempotency key is known: then *id is that job's and *created false.
+ * returns  GROOM_ECONFLICT where the key stands for another request */
+GROOM_MUST_CHECK groom_status store_job_create(struct store *store, const struct store_job_new *job,
+                                               char id[STORE_ID_SIZE], bool *created, struct groom_diag *diag);
+/* returns  GROOM_ENOTFOUND */
+GROOM_MUST_CHECK groom_status store_job_get(struct store *store, const char *id, struct store_job *job,
+                                            struct groom_diag *diag);
+/* state: NULL for any. */
+GROOM_MUST_CHECK groom_status store_jobs_list(struct store *store, const enum store_job_state *state,
+                                              struct store_page page, struct store_job_list *list,
+                                              struct groom_diag *diag);
+void store_job_finish(struct store_job *job);
+void store_job_list_finish(struct store_job_list *list);
+
+/* Note that a running job is to be cancelled; the supervisor stops its worker and then moves it.
+ * *state is the job's present state (an end state: nothing was noted). returns  GROOM_ENOTFOUND */
+GROOM_MUST_CHECK groom_status store_job_request_cancel(struct store *store, const char *id,
+                                                       enum store_job_state *state, struct groom_diag *diag);
+
+/* --- attempts ----------------------------------------------------------------------------------- */
+
+/* Names one attempt. A call with a ref is refused with GROOM_ECONFLICT once the attempt has ended or
+ * another has begun (fencing), in the same transaction as what it would write. */
+struct store_attempt_ref {
+    char job_id[STORE_ID_SIZE];
+    uint32_t number; /* from 1 */
+};
+
+enum store_attempt_state {
+    STORE_ATTEMPT_RUNNING,
+    STORE_ATTEMPT_SUCCEEDED,
+    STORE_ATTEMPT_FAILED,    /* the worker said that the job cannot be done */
+    STORE_ATTEMPT_DIED,      /* ended without a result: counts towards the job's limit */
+    STORE_ATTEMPT_STOPPED,   /* by the daemon (drained, restarted): does not count */
+    STORE_ATTEMPT_CANCELLED,
+    STORE_ATTEMPT_STATES
+};
+const char *store_attempt_state_name(enum store_attempt_state state);
+
+struct store_attempt {
+    struct store_attempt_ref ref;
+    enum store_attempt_state state;
+    char *handle;     /* the launcher's name for its process; "" before it was launched */
+    char *last_words; /* the tail of its stderr, with how it ended; "" */
+    int64_t started_ms, finished_ms;
+};
+
+struct store_attempt_list {
+    struct store_attempt *items;
+    size_t n;
+};
+
+/* Take the first queued job whose time has come: it is running from now on with a new attempt, whose
+ * token has this SHA-256.
+ * *taken false: there was none; then *next_ms is when the next back-off ends (0: nothing waits) */
+GROOM_MUST_CHECK groom_status store_job_take(struct store *store, const char *token_hash,
+                                             struct store_attempt_ref *ref, bool *taken, int64_t *next_ms,
+                                             struct groom_diag *diag);
+/* The handle that the launcher gave. */
+GROOM_MUST_CHECK groom_status store_attempt_launched(struct store *store, const struct store_attempt_ref *ref,
+                                                     const char *handle, struct groom_diag *diag);
+/* The attempt whose token has this hash.
+ * returns  GROOM_ENOTFOUND (no such token), GROOM_ECONFLICT (it has ended, or another has begun) */
+GROOM_MUST_CHECK groom_status store_attempt_find(struct store *store, const char *token_hash,
+                                                 struct store_attempt_ref *ref, struct groom_diag *diag);
+/* All attempts of a job, oldest first; job_id NULL: all that are running. */
+GROOM_MUST_CHECK groom_status store_attempts_list(struct store *store, const char *job_id,
+                                                  struct store_attempt_list *list, struct groom_diag *diag);
+void store_attempt_list_finish(struct store_attempt_list *list);
+
+/* What a worker reports now and then. */
+struct store_loss {
+    const char *stage;
+    int64_t iteration;
+    const char *name;
+    double value;
+};
+
+struct store_event_new {
+    const char *type; /* "stage", "progress", "loss" */
+    const char *data; /* JSON */
+};
+
+struct store_progress {
+    const char *stage; /* NULL: unchanged, with index and count */
+    uint32_t stage_index, stage_count;
+    double progress;   /* negative: unchanged */
+    double eta_s;      /* negative: unknown */
+    const char *loss;  /* JSON object of the last values, or NULL: unchanged */
+    const struct store_loss *losses;
+    size_t n_losses;
+    const struct store_event_new *events;
+    size_t n_events;
+};
+
+/* *cancel: the job is to be cancelled. returns  GROOM_ECONFLICT (fenced) */
+GROOM_MUST_CHECK groom_status store_attempt_progress(struct store *store, const struct store_attempt_ref *ref,
+                                                     const struct store_progress *progress, bool *cancel,
+                                                     struct groom_diag *diag);
+
+struct store_checkpoint {
+    char sha256[STORE_HASH_SIZE];
+    uint64_t n_bytes;
+    uint32_t stage; /* stages that are done */
+};
+
+/* This blob is the job's checkpoint from now on; `replaced` is what it was before ("" for none).
+ * returns  GROOM_ECONFLICT (fenced) */
+GROOM_MUST_CHECK groom_status store_attempt_checkpoint(struct store *store, const struct store_attempt_ref *ref,
+                                                       const struct store_checkpoint *checkpoint,
+                                                       char replaced[STORE_HASH_SIZE], struct groom_diag *diag);
+/* returns  GROOM_ENOTFOUND where the job has none (or never was) */
+GROOM_MUST_CHECK groom_status store_checkpoint_get(struct store *store, const char *job_id,
+                                                   struct store_checkpoint *checkpoint, struct groom_diag *diag);
+
+/* --- the one way from state to state -------------------------------------------------------------- */
+
+struct store_job_move {
+    const char *job_id;
+    enum store_job_state from, to;
+    uint32_t attempt;                       /* 0: none ends; else the job's present one */
+    enum store_attempt_state attempt_state; /* how it ended */
+    const char *last_words;                 /* of it; NULL: "" */
+    int64_t not_before_ms;                  /* back to queued: no earlier than this; 0: at once */
+    const char *result, *error;             /* JSON objects for the end states, or NULL */
+    const struct store_revision_new *groom; /* created in the same transaction, or NULL */
+};
+
+/* Move a job, end its attempt, write its groom and its `state` event: all or nothing. Into an end
+ * state, its checkpoint row goes; `garbage` is that blob ("" for none) for the caller to collect.
+ * returns  GROOM_ECONFLICT (it is not in `from`, or `attempt` is not its running one),
+ *          GROOM_ECANCELLED (to succeeded, but its cancellation was asked for),
+ *          GROOM_ENOTFOUND, and what store_groom_create returns */
+GROOM_MUST_CHECK groom_status store_job_move(struct store *store, const struct store_job_move *move,
+                                             char garbage[STORE_HASH_SIZE], struct groom_diag *diag);
+
+/* --- events and losses ---------------------------------------------------------------------------------- */
+
+struct store_event {
+    int64_t sequence; /* from 1 within a job, without gaps */
+    char *type;       /* "stage", "progress", "loss", "state" */
+    char *data;       /* JSON */
+    int64_t created_ms;
+};
+
+struct store_event_list {
+    struct store_event *items;
+    size_t n;
+};
+
+/* Events after sequence `after`, in order, at most `limit` (0: 1000). returns  GROOM_ENOTFOUND */
+GROOM_MUST_CHECK groom_status store_events_since(struct store *store, const char *job_id, int64_t after,
+                                                 uint32_t limit, struct store_event_list *list,
+                                                 struct groom_diag *diag);
+void store_event_list_finish(struct store_event_list *list);
+
+struct store_loss_row {
+    char *stage;
+    int64_t iteration;
+    char *name;
+    double value;
+};
+
+struct store_loss_list {
+    struct store_loss_row *items;
+    size_t n;
+};
+
+/* All of a job, in the order in which they were reported. returns  GROOM_ENOTFOUND */
+GROOM_MUST_CHECK groom_status store_losses_list(struct store *store, const char *job_id,
+                                                struct store_loss_list *list, struct groom_diag *diag);
+void store_loss_list_finish(struct store_loss_list *list);
+
+/* --- keeping house ------------------------------------------------------------------------------------------ */
+
+struct store_counts {
+    uint64_t jobs[STORE_JOB_STATES];
+    uint64_t strands, heads, grooms, revisions, attempts_died;
+};
+GROOM_MUST_CHECK groom_status store_count(struct store *store, struct store_counts *counts,
+                                          struct groom_diag *diag);
+
+/* Does any row refer to this blob? What the collector of blobs asks. */
+GROOM_MUST_CHECK groom_status store_blob_referenced(struct store *store, const char *sha256, bool *referenced,
+                                                    struct groom_diag *diag);
+
+#endif
