@@ -21,7 +21,7 @@ declare -A allowed=(
     [lib/render]="base geometry strands render"
 )
 declare -A room_of_header=(
-    [status]=base [diag]=base [context]=base [random]=base
+    [status]=base [diag]=base [context]=base [random]=base [io]=base
     [mesh]=geometry [spatial]=geometry [scalp]=geometry [camera]=geometry
     [strands]=strands [format]=strands
     [groom]=model [document]=model

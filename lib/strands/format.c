@@ -56,38 +56,3 @@ groom_status groom_format_parse(const char *name, groom_format *format, struct g
         }
     return refuse_name(name, diag);
 }
-
-/* A plain decimal number: strtod alone would also take hexadecimal, "inf" and "nan". */
-static int parse_positive(const char *text, double *value)
-{
-    char *end;
-    if (!*text || strspn(text, "0123456789+-.eE") != strlen(text))
-        return 0;
-    *value = strtod(text, &end);
-    return *end == '\0' && *value > 0 && isfinite(*value);
-}
-
-groom_status groom_unit_parse(const char *text, double *unit_m, struct groom_diag *diag)
-{
-    static const struct { const char *name; double unit_m; } units[] = {
-        {"m", 1}, {"dm", 0.1}, {"cm", 0.01}, {"mm", 0.001}, {"in", 0.0254}};
-    for (size_t i = 0; i < sizeof units / sizeof units[0]; i++)
-        if (strcmp(text, units[i].name) == 0) {
-            *unit_m = units[i].unit_m;
-            return GROOM_OK;
-        }
-    double value;
-    if (!parse_positive(text, &value))
-        return groom_fail(diag, GROOM_EINVAL,
-                          "\"%.40s\" is no unit; it may be m, cm, mm, dm, in or a positive number of metres", text);
-    *unit_m = value;
-    return GROOM_OK;
-}
-
-groom_status groom_up_parse(const char *text, groom_up *up, struct groom_diag *diag)
-{
-    if (strcmp(text, "y") != 0 && strcmp(text, "z") != 0)
-        return groom_fail(diag, GROOM_EINVAL, "\"%.40s\" is no up axis; it may be y or z", text);
-    *up = text[0] == 'y' ? GROOM_UP_Y : GROOM_UP_Z;
-    return GROOM_OK;
-}

@@ -13,6 +13,7 @@
 
 #include "groom/context.h"
 #include "groom/diag.h"
+#include "groom/io.h"
 #include "groom/strands.h"
 
 #ifdef __cplusplus
@@ -52,37 +53,7 @@ int groom_format_writable(groom_format format);
 GROOM_MUST_CHECK groom_status groom_format_parse(const char *name, groom_format *format,
                                                  struct groom_diag *diag);
 
-/* --- units and axes ------------------------------------------------------ */
-
-typedef enum groom_up { GROOM_UP_Y = 0, GROOM_UP_Z = 1 } groom_up;
-
-/* The frame of a file: metres in one of its units, and its up axis. With z up,
- * (x, y, z) in the file is (x, z, -y) inside; writing undoes it. */
-struct groom_frame {
-    double unit_m; /* 1 for metres, 0.01 for centimetres */
-    groom_up up;
-};
-
-/* "m", "cm", "mm", "dm", "in" or a positive number of metres; "y" or "z". */
-GROOM_MUST_CHECK groom_status groom_unit_parse(const char *text, double *unit_m, struct groom_diag *diag);
-GROOM_MUST_CHECK groom_status groom_up_parse(const char *text, groom_up *up, struct groom_diag *diag);
-
 /* --- reading -------------------------------------------------------------- */
-
-/* Where bytes come from. `read` returns how many bytes it put into buffer (up to capacity),
- * 0 at the end, -1 on failure; it may block. size is -1 where it is not known beforehand. */
-struct groom_source {
-    int64_t (*read)(void *user, void *buffer, size_t capacity);
-    void *user;
-    int64_t size;
-};
-
-struct groom_memory_source { const unsigned char *bytes; size_t n_bytes, at; };
-/* A source over bytes that the caller keeps. */
-struct groom_source groom_source_from_memory(struct groom_memory_source *state,
-                                             const void *bytes, size_t n_bytes);
-/* A source over an open file descriptor (read from where it stands; not closed). */
-struct groom_source groom_source_from_fd(int fd);
 
 struct groom_read_options {
     groom_format format;      /* GROOM_FORMAT_AUTO: recognised from the bytes */
@@ -114,12 +85,6 @@ GROOM_MUST_CHECK groom_status groom_strands_read(const struct groom_source *sour
                                                  struct groom_diag *diag);
 
 /* --- writing -------------------------------------------------------------- */
-
-/* Where bytes go: all n bytes or a failure (GROOM_EIO, GROOM_ENOSPC, GROOM_ECANCELLED). */
-struct groom_sink {
-    groom_status (*write)(void *user, const void *bytes, size_t n_bytes);
-    void *user;
-};
 
 struct groom_write_options {
     groom_format format;

@@ -13,6 +13,7 @@
 
 #include "groom/context.h"
 #include "groom/diag.h"
+#include "groom/scalp.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -74,14 +75,6 @@ uint32_t groom_operator_random_arrays(groom_operator_type type);
 int groom_operator_random_per_guide(groom_operator_type type);
 
 /* --- the groom ------------------------------------------------------------ */
-
-/* Where scalp coordinates came from; recorded in the document. */
-typedef enum groom_scalp_source {
-    GROOM_SCALP_MESH_UV,  /* the head's own texture coordinates */
-    GROOM_SCALP_COMPUTED, /* computed on a head that has none */
-    GROOM_SCALP_ROOTS,    /* from the roots alone; no head was given */
-    GROOM_SCALP_FILE      /* the strands' file brought them */
-} groom_scalp_source;
 
 struct groom {
     char name[128];

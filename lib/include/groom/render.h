@@ -1,0 +1,76 @@
+/* Still pictures of hair, by a rasteriser of our own: what a preview shows without a graphics card.
+ *
+ * Strands are lines of the width of hair, antialiased by coverage in depth order, shaded by
+ * Kajiya and Kay (1989) under a key and a rim light and darkened by the hair between them and the
+ * light; the head is a shaded z-buffered mesh that hides what lies behind it. */
+#ifndef GROOM_RENDER_H
+#define GROOM_RENDER_H
+
+#include <stdint.h>
+
+#include "groom/context.h"
+#include "groom/diag.h"
+#include "groom/io.h"
+#include "groom/mesh.h"
+#include "groom/strands.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Where the camera stands, in the library's frame: y up, the face towards +z. The front view looks
+ * along -z and has the person's left (+x) on the right; the side view looks from the person's left
+ * (+x) along -x and has the face on the left; the back view looks along +z; the top view looks down
+ * with the face at the bottom of the picture.
+ * X(constant, name) */
+#define GROOM_VIEW_LIST(X)                                                                         \
+    X(GROOM_VIEW_FRONT, "front")                                                                   \
+    X(GROOM_VIEW_SIDE,  "side")                                                                    \
+    X(GROOM_VIEW_BACK,  "back")                                                                    \
+    X(GROOM_VIEW_TOP,   "top")
+
+typedef enum groom_view {
+#define GROOM_VIEW_ENUM(name, slug) name,
+    GROOM_VIEW_LIST(GROOM_VIEW_ENUM)
+#undef GROOM_VIEW_ENUM
+    GROOM_VIEW_COUNT
+} groom_view;
+
+const char *groom_view_name(groom_view view);
+/* "front" ...; returns GROOM_OK or GROOM_EINVAL with the list of names in diag */
+GROOM_MUST_CHECK groom_status groom_view_parse(const char *name, groom_view *view, struct groom_diag *diag);
+
+#define GROOM_RENDER_MIN_SIZE 64
+#define GROOM_RENDER_MAX_SIZE 4096
+
+struct groom_render_options {
+    groom_view view;
+    uint32_t size;      /* the picture is size x size pixels */
+    float width_m;      /* of a hair; 0: as wide as its share of the scalp asks for */
+    float color[3];     /* of hair, linear 0..1; {0, 0, 0}: a dark brown */
+};
+
+/* Draw strands, on a head if there is one.
+ * The camera is a long lens (20 degrees) at the height of the hair, framed so that the whole of
+ * the hair and the part of the head around it fills the picture with a small margin.
+ * strands  at least one; points that are not finite are not drawn
+ * head     may be NULL
+ * rgba     [size][size][4], the caller's: sRGB, opaque, top row first
+ * returns  GROOM_OK, GROOM_EINVAL (size, view), GROOM_EEMPTY (no strand), GROOM_ENOMEM, GROOM_ECANCELLED
+ * threads  same bits for any pool */
+GROOM_MUST_CHECK groom_status groom_render_strands(const struct groom_strands *strands,
+                                                   const struct groom_mesh *head,
+                                                   const struct groom_render_options *options,
+                                                   uint8_t *rgba, const struct groom_context *context,
+                                                   struct groom_diag *diag);
+
+/* Encode a picture as PNG. Nothing in the bytes depends on time or machine.
+ * returns  GROOM_OK, GROOM_EINVAL (a side of 0), GROOM_ENOMEM, what the sink answers */
+GROOM_MUST_CHECK groom_status groom_png_write(const uint8_t *rgba, uint32_t width, uint32_t height,
+                                              struct groom_sink sink, const struct groom_context *context,
+                                              struct groom_diag *diag);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
