@@ -1,0 +1,123 @@
+/* Grooms as the HTTP side sees them: documents, revisions, edits, and what is evaluated from them.
+ *
+ * A groom is a row of immutable revisions. Each is a document whose large arrays are kept once by
+ * their SHA-256 (server/store), so that turning a knob writes a few kilobytes. Models that were
+ * lately used stay decoded in memory.
+ *
+ * threads   any; every call may wait for the disk or compute: call from service threads
+ * text      malloc'ed, zero-terminated, the caller's to free
+ * errors    GROOM_ENOTFOUND (groom or revision), GROOM_EINVAL with a JSON pointer, GROOM_ECONFLICT
+ *           (the expected revision is not the latest: HTTP 412), and what the store answers */
+#ifndef GROOMS_GROOMS_H
+#define GROOMS_GROOMS_H
+
+#include "groom/format.h"
+#include "groom/render.h"
+#include "server/blobs/blobs.h"
+#include "server/store/store.h"
+
+struct grooms;
+
+struct grooms_options {
+    struct store *store;            /* borrowed */
+    struct blobs *blobs;            /* borrowed: where uploaded heads are */
+    struct groom_pool *pool;        /* borrowed; evaluation takes turns in it */
+    const char *worker_path;        /* groom-worker: draws previews, for it parses uploaded heads */
+    const char *temporary_folder;   /* for files that have no name; borrowed */
+    size_t max_cache_bytes;         /* of decoded models; 0: 512 MiB */
+};
+
+GROOM_MUST_CHECK groom_status grooms_create(const struct grooms_options *options, struct grooms **grooms,
+                                            struct groom_diag *diag);
+void grooms_destroy(struct grooms *grooms); /* takes NULL */
+
+/* --- new grooms --------------------------------------------------------------------- */
+
+/* Where a groom comes from: the document's "source". Members may be NULL. */
+struct grooms_source {
+    const char *strands, *head, *job; /* ids */
+    const char *note;                 /* what made it: "fit", "import" */
+};
+
+/* A checked first revision, ready to be stored: by store_groom_create, or in one transaction with the
+ * end of its job (work_result). */
+struct grooms_prepared {
+    struct store_revision_new revision; /* points into what follows */
+    char groom_id[STORE_ID_SIZE];
+    struct grooms_kept *kept;           /* owns document, name and arrays */
+};
+
+/* document  a groom document with inline arrays; its id, revision, parent and source are replaced
+ *           (source is kept where `source` is NULL, as far as it names things)
+ * prepared  the caller's, grooms_prepared_finish */
+GROOM_MUST_CHECK groom_status grooms_prepare(struct grooms *grooms, const char *document, size_t n_bytes,
+                                             const struct grooms_source *source,
+                                             struct grooms_prepared *prepared, struct groom_diag *diag);
+void grooms_prepared_finish(struct grooms_prepared *prepared); /* takes zeroed */
+
+/* POST /v1/grooms: prepare and store. The document has passed `groom-worker check-groom`. */
+GROOM_MUST_CHECK groom_status grooms_import(struct grooms *grooms, const char *document, size_t n_bytes,
+                                            char groom_id[STORE_ID_SIZE], struct groom_diag *diag);
+
+/* --- reading ---------------------------------------------------------------------------- */
+
+/* The document of a revision (0: the latest), arrays inline or, with arrays false, only their dtype
+ * and shape. *number is the revision that it is: the ETag is "<number>". */
+GROOM_MUST_CHECK groom_status grooms_document(struct grooms *grooms, const char *groom_id, uint32_t revision,
+                                              bool arrays, char **json, size_t *n_bytes, uint32_t *number,
+                                              struct groom_diag *diag);
+/* {"grooms":[{"id","name","revision","created_at","changed_at"},…],"next":…} */
+GROOM_MUST_CHECK groom_status grooms_list_json(struct grooms *grooms, struct store_page page, char **json,
+                                               struct groom_diag *diag);
+/* {"revisions":[{"revision","parent","name","note","created_at"},…],"next":…} */
+GROOM_MUST_CHECK groom_status grooms_revisions_json(struct grooms *grooms, const char *groom_id,
+                                                    struct store_page page, char **json,
+                                                    struct groom_diag *diag);
+
+/* --- edits: each makes the revision after `expected` ---------------------------------------- */
+
+enum grooms_patch_kind {
+    GROOMS_JSON_PATCH, /* RFC 6902 */
+    GROOMS_MERGE_PATCH /* RFC 7396 */
+};
+
+/* Patch the document. format, unit, id, revision, parent and source are not the client's to change.
+ * An operator whose seed is changed, and its random numbers not, has them drawn anew.
+ * *number is the new revision. */
+GROOM_MUST_CHECK groom_status grooms_patch(struct grooms *grooms, const char *groom_id, uint32_t expected,
+                                           enum grooms_patch_kind kind, const char *patch, size_t n_bytes,
+                                           uint32_t *number, struct groom_diag *diag);
+/* PUT guides: as many strands as there are guides, in the same order; each is resampled to the groom's
+ * vertices. */
+GROOM_MUST_CHECK groom_status grooms_set_guides(struct grooms *grooms, const char *groom_id, uint32_t expected,
+                                                const struct groom_strands *guides, uint32_t *number,
+                                                struct groom_diag *diag);
+/* A new revision that is the same as an earlier one. */
+GROOM_MUST_CHECK groom_status grooms_revert(struct grooms *grooms, const char *groom_id, uint32_t expected,
+                                            uint32_t revision, uint32_t *number, struct groom_diag *diag);
+
+/* --- what is evaluated -------------------------------------------------------------------------- */
+
+struct grooms_export {
+    uint32_t revision; /* 0: the latest */
+    struct groom_write_options write;
+    uint32_t count;    /* of strands: a fair sample of them, the same for every revision, and each
+                        * smaller one part of the larger ones. 0: all */
+};
+
+/* Strands 0..n-1 of a revision, evaluated piece by piece into the sink. */
+GROOM_MUST_CHECK groom_status grooms_write_strands(struct grooms *grooms, const char *groom_id,
+                                                   const struct grooms_export *what, struct groom_sink sink,
+                                                   struct groom_diag *diag);
+/* The guides; count is not used. */
+GROOM_MUST_CHECK groom_status grooms_write_guides(struct grooms *grooms, const char *groom_id,
+                                                  const struct grooms_export *what, struct groom_sink sink,
+                                                  struct groom_diag *diag);
+
+/* A shaded picture of the dense strands on the head that the groom was fitted with, as PNG bytes
+ * (malloc'ed). */
+GROOM_MUST_CHECK groom_status grooms_preview(struct grooms *grooms, const char *groom_id, uint32_t revision,
+                                             groom_view view, uint32_t size, char **png, size_t *n_bytes,
+                                             struct groom_diag *diag);
+
+#endif
