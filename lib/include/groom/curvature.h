@@ -1,0 +1,92 @@
+/* Curvature space: strands as super-helices, chains of helical elements.
+ *
+ * Shi et al. 2026, "Curvature Space Editing of Highly-Coiled Hair". A super-helix is a root point,
+ * a root material frame [t u v] and, for each element, a length l and a constant local Darboux
+ * vector q = (twist, curvature 1, curvature 2) in the material frame. The frame turns with
+ * Omega = F q, so that curvature q_1 turns about u and q_2 about v; |(q_1, q_2)| is the curve's
+ * curvature and the twist is its torsion. q does not change when the strand is moved or turned.
+ *
+ * Lengths are metres (q: 1/metre), double precision. Every function gives the same bits for any
+ * pool. Numbers that are not finite are refused with GROOM_EINVAL before anything is written. */
+#ifndef GROOM_CURVATURE_H
+#define GROOM_CURVATURE_H
+
+#include <stdint.h>
+
+#include "groom/context.h"
+#include "groom/diag.h"
+#include "groom/strands.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* --- the representation --------------------------------------------------- */
+
+/* Strands one after the other: the elements of strand i are first[i] .. first[i+1] - 1. */
+struct groom_superhelices {
+    uint32_t n_strands;
+    uint32_t n_elements;  /* of all strands together */
+    uint32_t *first;      /* [n_strands + 1]; first[0] = 0, first[n_strands] = n_elements */
+    double (*root)[3];    /* [n_strands] */
+    double (*frame)[3][3];/* [n_strands]; frame[i][0] is the tangent t, then u, v: orthonormal, right-handed */
+    double *length;       /* [n_elements], 0 or more */
+    double (*q)[3];       /* [n_elements] twist, curvatures: 1/metre */
+    const struct groom_allocator *allocator; /* owns the arrays */
+};
+
+/* Room for so many; the counts are set, first[0] = 0, the rest is uninitialised. Owned by the caller.
+ * returns  GROOM_OK, GROOM_ETOOBIG (more than 2^32-1 elements), GROOM_ENOMEM */
+GROOM_MUST_CHECK groom_status groom_superhelices_create(uint64_t n_strands, uint64_t n_elements,
+                                                        const struct groom_context *context,
+                                                        struct groom_superhelices **helices,
+                                                        struct groom_diag *diag);
+void groom_superhelices_destroy(struct groom_superhelices *helices); /* takes NULL */
+
+/* A copy of its own. returns  GROOM_OK, GROOM_ENOMEM */
+GROOM_MUST_CHECK groom_status groom_superhelices_copy(const struct groom_superhelices *helices,
+                                                      const struct groom_context *context,
+                                                      struct groom_superhelices **copy,
+                                                      struct groom_diag *diag);
+
+/* Is it what it says? Offsets rise, every strand has an element, every number is finite, lengths are
+ * not negative, frames are orthonormal to 1e-6. All functions below rely on it; call it on what
+ * came from outside.
+ * returns  GROOM_OK, GROOM_EINVAL with the strand in diag */
+GROOM_MUST_CHECK groom_status groom_superhelices_check(const struct groom_superhelices *helices,
+                                                       struct groom_diag *diag);
+
+/* The arc length of one strand. */
+double groom_superhelix_length(const struct groom_superhelices *helices, uint32_t strand);
+
+/* --- back to points (Eqs. 2-8) --------------------------------------------- */
+
+/* Points of one strand at n arc lengths, in any order; rising is fastest. Outside 0..length they
+ * are clamped. A station on a junction belongs to the next element.
+ * frames   [n][3][3] as in the struct, or NULL */
+void groom_superhelix_sample(const struct groom_superhelices *helices, uint32_t strand,
+                             const double *arc, uint32_t n, double (*points)[3],
+                             double (*frames)[3][3]);
+
+/* Every strand at n_vertices points, uniform in arc length, root and tip among them.
+ * out      [n_strands][n_vertices][3], allocated by the caller
+ * returns  GROOM_OK, GROOM_EINVAL (n_vertices < 2) */
+GROOM_MUST_CHECK groom_status groom_superhelices_sample(const struct groom_superhelices *helices,
+                                                        uint32_t n_vertices, float (*out)[3],
+                                                        const struct groom_context *context,
+                                                        struct groom_diag *diag);
+
+/* Every strand at stations of its own.
+ * first    [n_strands + 1] where each strand's stations begin
+ * at       [first[n_strands]] fractions 0..1 of the strand's arc length
+ * out      [first[n_strands]][3] */
+GROOM_MUST_CHECK groom_status groom_superhelices_sample_at(const struct groom_superhelices *helices,
+                                                           const uint32_t *first, const float *at,
+                                                           float (*out)[3],
+                                                           const struct groom_context *context,
+                                                           struct groom_diag *diag);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
