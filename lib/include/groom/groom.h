@@ -65,14 +65,22 @@ struct groom_operator_parameter {
     const char *help;       /* one sentence for a groomer */
 };
 
+/* One of an operator's arrays of random numbers. */
+struct groom_operator_random {
+    const char *name;       /* "u", "u1": the key below "random" in a document */
+    float minimum, maximum; /* -1..1: N(0,1) truncated (redrawn); 0..1: U(0,1) */
+};
+
 const char *groom_operator_name(groom_operator_type type);
 /* The parameters of a type, and their number in *n. Static. */
 const struct groom_operator_parameter *groom_operator_parameters(groom_operator_type type, uint32_t *n);
 /* returns GROOM_OK or GROOM_EINVAL with the list of names in diag */
 GROOM_MUST_CHECK groom_status groom_operator_parse(const char *name, groom_operator_type *type,
                                                    struct groom_diag *diag);
-uint32_t groom_operator_random_arrays(groom_operator_type type);
-int groom_operator_random_per_guide(groom_operator_type type);
+/* The random arrays of a type, and their number in *n. Static. */
+const struct groom_operator_random *groom_operator_randoms(groom_operator_type type, uint32_t *n);
+uint32_t groom_operator_random_arrays(groom_operator_type type);   /* their number alone */
+int groom_operator_random_per_guide(groom_operator_type type);     /* 1: one for each operator guide */
 
 /* --- the groom ------------------------------------------------------------ */
 
@@ -113,21 +121,24 @@ GROOM_MUST_CHECK groom_status groom_clone(const struct groom *groom, const struc
                                           struct groom **copy, struct groom_diag *diag);
 
 /* Everything a groom must hold to be evaluated: indices in range, weights finite and summing to 1
- * (within 1e-3), parameters in range, random numbers in range, points finite.
+ * (within 1e-3), parameters in range, random numbers in range, points finite and within 1 000 km.
  * returns  GROOM_OK or GROOM_EINVAL with the JSON pointer of the culprit */
 GROOM_MUST_CHECK groom_status groom_validate(const struct groom *groom, struct groom_diag *diag);
 
 /* --- the chain ------------------------------------------------------------ */
 
-/* Insert an operator at `index` (0..n_operators) with its initial parameters, an id of its own, and
- * random numbers drawn from `seed`. */
+/* Insert an operator at `index` (0..n_operators), enabled, with its initial parameters, an id of its
+ * own, and random numbers drawn from `seed`. These three leave the groom as it was on error.
+ * returns  GROOM_OK, GROOM_EINVAL (an index outside the chain, an unknown type), GROOM_ENOMEM */
 GROOM_MUST_CHECK groom_status groom_insert_operator(struct groom *groom, uint32_t index,
                                                     groom_operator_type type, uint64_t seed,
                                                     struct groom_diag *diag);
 GROOM_MUST_CHECK groom_status groom_remove_operator(struct groom *groom, uint32_t index, struct groom_diag *diag);
+/* Take the operator at `from` out and put it back so that it stands at `to`. */
 GROOM_MUST_CHECK groom_status groom_move_operator(struct groom *groom, uint32_t from, uint32_t to,
                                                   struct groom_diag *diag);
-/* Draw an operator's random numbers anew: a function of (seed, operator id, strand or operator guide). */
+/* Draw an operator's random numbers anew and keep the seed: a function of (seed, operator id, strand
+ * or operator guide), whatever else is in the chain. `op` belongs to `groom`. */
 void groom_draw_random(struct groom *groom, struct groom_operator *op, uint64_t seed);
 
 /* --- instancing ------------------------------------------------------------ */

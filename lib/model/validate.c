@@ -1,0 +1,117 @@
+/* Whether a groom can be evaluated: everything that came from outside is looked at once, here. */
+#include <math.h>
+#include <stdio.h>
+
+#include "groom/groom.h"
+#include "model/model.h"
+
+#define WEIGHT_SUM_TOLERANCE 1e-3
+#define COORDINATE_LIMIT 1e6f /* metres */
+#define WEIGHT_LIMIT 1e4f
+
+/* Finite, and within `limit` either way, so that lengths and their squares stay finite too. */
+static groom_status check_values(const float *values, size_t n, float limit, const char *pointer,
+                                 struct groom_diag *diag)
+{
+    for (size_t i = 0; i < n; i++)
+        if (!(fabsf(values[i]) <= limit))
+            return groom_fail_field(diag, GROOM_EINVAL, pointer, "value %zu of %zu is %g; it must be finite and within %g",
+                                    i, n, (double)values[i], (double)limit);
+    return GROOM_OK;
+}
+
+static groom_status check_indices(const uint32_t *indices, size_t n, uint32_t limit, const char *pointer,
+                                  struct groom_diag *diag)
+{
+    for (size_t i = 0; i < n; i++)
+        if (indices[i] >= limit)
+            return groom_fail_field(diag, GROOM_EINVAL, pointer, "index %u at %zu is outside 0..%u", indices[i], i,
+                                    limit - 1);
+    return GROOM_OK;
+}
+
+static groom_status check_weights(const struct groom *groom, struct groom_diag *diag)
+{
+    for (uint32_t i = 0; i < groom->n_strands; i++) {
+        double sum = 0.0;
+        for (uint32_t k = 0; k < groom->n_instancing; k++)
+            sum += groom->instancing_weight[(size_t)i * groom->n_instancing + k];
+        if (!(fabs(sum - 1.0) <= WEIGHT_SUM_TOLERANCE))
+            return groom_fail_field(diag, GROOM_EINVAL, "/instancing/weight",
+                                    "the weights of strand %u sum to %.6g; they must sum to 1", i, sum);
+    }
+    return GROOM_OK;
+}
+
+static groom_status check_parameters(const struct groom_operator *op, uint32_t index, struct groom_diag *diag)
+{
+    char pointer[sizeof diag->pointer];
+    uint32_t n;
+    const struct groom_operator_parameter *parameters = groom_operator_parameters(op->type, &n);
+    for (uint32_t p = 0; p < n; p++) {
+        float value = op->parameter[p];
+        if (value >= parameters[p].minimum && value <= parameters[p].maximum)
+            continue;
+        snprintf(pointer, sizeof pointer, "/operators/%u/%s", index, parameters[p].name);
+        return groom_fail_field(diag, GROOM_EINVAL, pointer, "%s is %.6g; it must be %.6g..%.6g %s",
+                                parameters[p].name, (double)value, (double)parameters[p].minimum,
+                                (double)parameters[p].maximum, parameters[p].unit);
+    }
+    return GROOM_OK;
+}
+
+static groom_status check_randoms(const struct groom *groom, uint32_t index, struct groom_diag *diag)
+{
+    const struct groom_operator *op = &groom->operators[index];
+    char pointer[sizeof diag->pointer];
+    uint32_t n;
+    const struct groom_operator_random *randoms = groom_operator_randoms(op->type, &n);
+    for (uint32_t a = 0; a < n; a++)
+        for (size_t i = 0; i < model_random_count(groom, op->type); i++) {
+            float value = op->random[a][i];
+            if (value >= randoms[a].minimum && value <= randoms[a].maximum)
+                continue;
+            snprintf(pointer, sizeof pointer, "/operators/%u/random/%s", index, randoms[a].name);
+            return groom_fail_field(diag, GROOM_EINVAL, pointer, "value %zu is %.6g; it must be %g..%g", i,
+                                    (double)value, (double)randoms[a].minimum, (double)randoms[a].maximum);
+        }
+    return GROOM_OK;
+}
+
+static groom_status check_operators(const struct groom *groom, struct groom_diag *diag)
+{
+    groom_status status = GROOM_OK;
+    char pointer[sizeof diag->pointer];
+    for (uint32_t i = 0; i < groom->n_operators && status == GROOM_OK; i++) {
+        if ((unsigned)groom->operators[i].type >= GROOM_OPERATOR_COUNT) {
+            snprintf(pointer, sizeof pointer, "/operators/%u/type", i);
+            return groom_fail_field(diag, GROOM_EINVAL, pointer, "there is no operator type %d",
+                                    (int)groom->operators[i].type);
+        }
+        status = check_parameters(&groom->operators[i], i, diag);
+        if (status == GROOM_OK)
+            status = check_randoms(groom, i, diag);
+    }
+    return status;
+}
+
+groom_status groom_validate(const struct groom *g, struct groom_diag *diag)
+{
+    size_t n = g->n_strands, k = g->n_instancing;
+    groom_status status = GROOM_OK;
+#define CHECK(call)                                                                                                  \
+    if (status == GROOM_OK)                                                                                          \
+    status = call
+    CHECK(check_values(&g->roots[0][0], 3 * n, COORDINATE_LIMIT, "/strands/roots", diag));
+    CHECK(check_values(&g->root_uv[0][0], 2 * n, COORDINATE_LIMIT, "/strands/root_uv", diag));
+    CHECK(check_values(&g->guides[0][0], 3 * (size_t)g->n_guides * g->n_vertices, COORDINATE_LIMIT, "/guides/points", diag));
+    CHECK(check_values(&g->guide_uv[0][0], 2 * (size_t)g->n_guides, COORDINATE_LIMIT, "/guides/root_uv", diag));
+    CHECK(check_indices(g->instancing_guide, n * k, g->n_guides, "/instancing/guide", diag));
+    CHECK(check_values(g->instancing_weight, n * k, WEIGHT_LIMIT, "/instancing/weight", diag));
+    CHECK(check_weights(g, diag));
+    CHECK(check_indices(g->operator_guide, g->n_operator_guides, g->n_guides, "/operator_guides/guide", diag));
+    CHECK(check_indices(g->operator_guide_of, n, g->n_operator_guides, "/operator_guides/of_strand", diag));
+    CHECK(check_operators(g, diag));
+#undef CHECK
+    return status;
+}

@@ -1,0 +1,18 @@
+/* Random but plausible grooms for tests of the model. */
+#ifndef SUPPORT_GROOMS_H
+#define SUPPORT_GROOMS_H
+
+#include "groom/groom.h"
+
+/* A groom of this shape whose guides are smooth random curves of about 0.3 m on a sphere of 0.1 m,
+ * instanced by distance, each strand with its nearest operator guide. No operators. Fails the test
+ * on error. */
+struct groom *test_groom(struct groom_shape shape, uint64_t seed);
+
+/* Append an operator with parameters drawn from sensible ranges. */
+void test_append_operator(struct groom *groom, groom_operator_type type, uint64_t seed);
+
+/* All five, in the order of GROOM_OPERATOR_LIST. */
+void test_append_all_operators(struct groom *groom, uint64_t seed);
+
+#endif
