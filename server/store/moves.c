@@ -1,0 +1,219 @@
+/* The only place where a job goes from state to state. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/store/database.h"
+
+/* The arrows of the picture in store.h. */
+static bool allowed(enum store_job_state from, enum store_job_state to)
+{
+    switch (from) {
+    case STORE_JOB_QUEUED: return to == STORE_JOB_CANCELLED || to == STORE_JOB_FAILED;
+    case STORE_JOB_RUNNING: return to != STORE_JOB_RUNNING;
+    default: return false; /* an end state is left by no one */
+    }
+}
+
+/* --- taking --------------------------------------------------------------------------- */
+
+static groom_status take_first(struct store *store, int64_t now, struct store_attempt_ref *ref,
+                               struct groom_diag *diag)
+{
+    struct query q = query_open(store,
+                                "UPDATE jobs SET state = 1, attempt = attempt + 1,"
+                                " started = CASE started WHEN 0 THEN ?1 ELSE started END"
+                                " WHERE seq = (SELECT seq FROM jobs WHERE state = 0 AND not_before <= ?1"
+                                "  ORDER BY priority DESC, seq LIMIT 1) RETURNING id, attempt", diag);
+    query_integer(&q, 1, now);
+    if (query_row(&q)) {
+        query_copy(&q, 0, ref->job_id, sizeof ref->job_id);
+        ref->number = (uint32_t)query_int64(&q, 1);
+    }
+    return query_end(&q);
+}
+
+static groom_status insert_attempt(struct store *store, const struct store_attempt_ref *ref,
+                                   const char *token_hash, int64_t now, struct groom_diag *diag)
+{
+    char data[96];
+    struct query q = query_open(store, "INSERT INTO attempts (job_id, number, token_hash, state, started)"
+                                       " VALUES (?1, ?2, ?3, 0, ?4)", diag);
+    query_text(&q, 1, ref->job_id);
+    query_integer(&q, 2, ref->number);
+    query_text(&q, 3, token_hash);
+    query_integer(&q, 4, now);
+    groom_status status = query_run(&q, NULL);
+    if (status != GROOM_OK)
+        return status;
+    snprintf(data, sizeof data, "{\"state\":\"running\",\"attempt\":%u}", ref->number);
+    return event_append(store, ref->job_id, "state", data, now, diag);
+}
+
+static groom_status read_next_time(struct store *store, int64_t *next_ms, struct groom_diag *diag)
+{
+    struct query q = query_open(store, "SELECT coalesce(min(not_before), 0) FROM jobs WHERE state = 0", diag);
+    if (query_row(&q))
+        *next_ms = query_int64(&q, 0);
+    return query_end(&q);
+}
+
+groom_status store_job_take(struct store *store, const char *token_hash, struct store_attempt_ref *ref,
+                            bool *taken, int64_t *next_ms, struct groom_diag *diag)
+{
+    struct store_attempt_ref found = {0};
+    int64_t next = 0, now = store_now_ms();
+    groom_status status = transaction_begin(store, diag);
+    if (status != GROOM_OK)
+        return status;
+    status = take_first(store, now, &found, diag);
+    if (status == GROOM_OK)
+        status = found.number ? insert_attempt(store, &found, token_hash, now, diag)
+                              : read_next_time(store, &next, diag);
+    if ((status = transaction_end(store, status, diag)) != GROOM_OK)
+        return status;
+    *taken = found.number > 0;
+    *ref = found;
+    *next_ms = next;
+    return GROOM_OK;
+}
+
+/* --- moving ----------------------------------------------------------------------------- */
+
+struct present {
+    enum store_job_state state;
+    uint32_t attempt;
+    bool cancel_requested;
+};
+
+static groom_status read_present(struct store *store, const char *job_id, struct present *present,
+                                 struct groom_diag *diag)
+{
+    struct query q = query_open(store, "SELECT state, attempt, cancel_requested FROM jobs WHERE id = ?1", diag);
+    query_text(&q, 1, job_id);
+    bool found = query_row(&q);
+    if (found) {
+        present->state = (enum store_job_state)query_int64(&q, 0);
+        present->attempt = (uint32_t)query_int64(&q, 1);
+        present->cancel_requested = query_int64(&q, 2) != 0;
+    }
+    groom_status status = query_end(&q);
+    if (status == GROOM_OK && !found)
+        status = groom_fail(diag, GROOM_ENOTFOUND, "there is no job %.40s", job_id);
+    return status;
+}
+
+static groom_status check_move(const struct store_job_move *move, const struct present *present,
+                               struct groom_diag *diag)
+{
+    if (!allowed(move->from, move->to))
+        return groom_fail(diag, GROOM_ECONFLICT, "a job does not go from %s to %s",
+                          store_job_state_name(move->from), store_job_state_name(move->to));
+    if (present->state != move->from)
+        return groom_fail(diag, GROOM_ECONFLICT, "the job is %s, not %s", store_job_state_name(present->state),
+                          store_job_state_name(move->from));
+    if (move->attempt != 0 && present->attempt != move->attempt)
+        return groom_fail(diag, GROOM_ECONFLICT, "attempt %u has ended; the job is at attempt %u", move->attempt,
+                          present->attempt);
+    if (present->cancel_requested && (move->to == STORE_JOB_SUCCEEDED || move->to == STORE_JOB_QUEUED))
+        return groom_fail(diag, GROOM_ECANCELLED, "the job's cancellation was asked for");
+    return GROOM_OK;
+}
+
+static groom_status end_attempt(struct store *store, const struct store_job_move *move, int64_t now,
+                                struct groom_diag *diag)
+{
+    int64_t n_changed = 0;
+    struct query q = query_open(store, "UPDATE attempts SET state = ?3, last_words = ?4, finished = ?5"
+                                       " WHERE job_id = ?1 AND number = ?2 AND state = 0", diag);
+    query_text(&q, 1, move->job_id);
+    query_integer(&q, 2, move->attempt);
+    query_integer(&q, 3, move->attempt_state);
+    query_text(&q, 4, move->last_words ? move->last_words : "");
+    query_integer(&q, 5, now);
+    groom_status status = query_run(&q, &n_changed);
+    if (status == GROOM_OK && n_changed == 0)
+        status = groom_fail(diag, GROOM_ECONFLICT, "attempt %u has ended before", move->attempt);
+    return status;
+}
+
+static groom_status update_job(struct store *store, const struct store_job_move *move, int64_t now,
+                               struct groom_diag *diag)
+{
+    bool end = store_job_state_is_end(move->to);
+    struct query q = query_open(store,
+                                "UPDATE jobs SET state = ?2, not_before = ?3, n_failures = n_failures + ?4,"
+                                " result = ?5, error = ?6, finished = ?7, eta_s = -1,"
+                                " progress = CASE ?2 WHEN 2 THEN 1.0 ELSE progress END WHERE id = ?1", diag);
+    query_text(&q, 1, move->job_id);
+    query_integer(&q, 2, move->to);
+    query_integer(&q, 3, move->not_before_ms);
+    query_integer(&q, 4, move->attempt != 0 && move->attempt_state == STORE_ATTEMPT_DIED);
+    query_text(&q, 5, end ? move->result : NULL);
+    query_text(&q, 6, end ? move->error : NULL);
+    query_integer(&q, 7, end ? now : 0);
+    return query_run(&q, NULL);
+}
+
+/* {"state":…,"attempt":N,"result":{…},"error":{…}} */
+static groom_status append_state_event(struct store *store, const struct store_job_move *move, uint32_t attempt,
+                                       int64_t now, struct groom_diag *diag)
+{
+    size_t size = 128 + (move->result ? strlen(move->result) : 0) + (move->error ? strlen(move->error) : 0);
+    char *data = malloc(size);
+    if (!data)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for an event");
+    int n = snprintf(data, size, "{\"state\":\"%s\",\"attempt\":%u", store_job_state_name(move->to), attempt);
+    if (move->result)
+        n += snprintf(data + n, size - (size_t)n, ",\"result\":%s", move->result);
+    if (move->error)
+        n += snprintf(data + n, size - (size_t)n, ",\"error\":%s", move->error);
+    snprintf(data + n, size - (size_t)n, "}");
+    groom_status status = event_append(store, move->job_id, "state", data, now, diag);
+    free(data);
+    return status;
+}
+
+static groom_status drop_checkpoint(struct store *store, const char *job_id, char garbage[STORE_HASH_SIZE],
+                                    struct groom_diag *diag)
+{
+    struct query q = query_open(store, "DELETE FROM checkpoints WHERE job_id = ?1 RETURNING sha256", diag);
+    query_text(&q, 1, job_id);
+    if (query_row(&q))
+        query_copy(&q, 0, garbage, STORE_HASH_SIZE);
+    return query_run(&q, NULL);
+}
+
+static groom_status write_move(struct store *store, const struct store_job_move *move,
+                               char garbage[STORE_HASH_SIZE], struct groom_diag *diag)
+{
+    struct present present = {0};
+    int64_t now = store_now_ms();
+    groom_status status = read_present(store, move->job_id, &present, diag);
+    if (status == GROOM_OK)
+        status = check_move(move, &present, diag);
+    if (status == GROOM_OK && move->attempt != 0)
+        status = end_attempt(store, move, now, diag);
+    if (status == GROOM_OK && move->groom)
+        status = groom_insert(store, move->groom, now, diag);
+    if (status == GROOM_OK)
+        status = update_job(store, move, now, diag);
+    if (status == GROOM_OK)
+        status = append_state_event(store, move, present.attempt, now, diag);
+    if (status == GROOM_OK && store_job_state_is_end(move->to))
+        status = drop_checkpoint(store, move->job_id, garbage, diag);
+    return status;
+}
+
+groom_status store_job_move(struct store *store, const struct store_job_move *move, char garbage[STORE_HASH_SIZE],
+                            struct groom_diag *diag)
+{
+    char dropped[STORE_HASH_SIZE] = "";
+    groom_status status = transaction_begin(store, diag);
+    if (status != GROOM_OK)
+        return status;
+    status = transaction_end(store, write_move(store, move, dropped, diag), diag);
+    if (status == GROOM_OK)
+        memcpy(garbage, dropped, STORE_HASH_SIZE);
+    return status;
+}
