@@ -242,6 +242,7 @@ static int transfer_init(struct transfer *t, struct http_client *client, const s
     t->request = request;
     t->response = response;
     t->code = CURLE_OUT_OF_MEMORY;
+    if (request->begin) request->begin(request->user);
     t->easy = curl_easy_init();
     t->url = join(client->base_url, request->path);
     if (!t->easy || !t->url || !set_headers(client, t)) return 0;

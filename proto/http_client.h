@@ -57,9 +57,11 @@ struct http_request {
     /* Bytes of a 2xx answer as they come; anything but n stops the call. NULL: collected in
      * response->body, as the bodies of other answers always are (up to 256 MB). */
     size_t (*sink)(void *user, const char *bytes, size_t n);
+    /* The call begins: what the sink took of an earlier try is void. NULL: silence. */
+    void (*begin)(void *user);
     /* How much of the body has been sent. NULL: silence. */
     void (*sent)(void *user, uint64_t n_sent, uint64_t n_total);
-    void *user;            /* of sink and sent */
+    void *user;            /* of sink, begin and sent */
     int timeout_ms;        /* of the whole call; 0: none */
     int idle_timeout_s;    /* no byte either way for so long is HTTP_BROKEN; 0: 60 */
 };

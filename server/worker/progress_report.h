@@ -1,0 +1,31 @@
+/* Telling the daemon where an attempt stands, at most twice a second, and hearing whether to stop. */
+#ifndef WORKER_PROGRESS_REPORT_H
+#define WORKER_PROGRESS_REPORT_H
+
+#include "groom/fit.h"
+#include "server/worker/work_link.h"
+
+#define PROGRESS_MAX_LOSSES 512
+
+struct progress_report {
+    struct work_link *link;
+    const struct groom_fit *fit;       /* NULL before there is one */
+    double first_fraction, started_s;  /* of this attempt: what the time left is reckoned from */
+    double sent_s;
+    int halted;                        /* the daemon said cancel, or the line is gone: stop */
+    struct groom_progress callbacks;   /* for the library's context */
+    uint32_t n_losses;
+    struct progress_loss { char stage[24], name[24]; uint64_t iteration; double value; } losses[PROGRESS_MAX_LOSSES];
+};
+
+void progress_report_init(struct progress_report *report, struct work_link *link);
+/* From here on it knows the fit; where it stands now is where this attempt began. */
+void progress_report_follow(struct progress_report *report, const struct groom_fit *fit);
+/* Send where half a second has gone by, or `now`.
+ * returns  GROOM_OK, GROOM_ECANCELLED */
+GROOM_MUST_CHECK groom_status progress_report_send(struct progress_report *report, int now);
+
+/* The message (proto/work.h); malloc'ed, NULL where memory is out. */
+char *progress_report_text(const struct progress_report *report, double now_s);
+
+#endif
