@@ -18,7 +18,7 @@
 #include "groom/camera.h"
 #include "groom/context.h"
 #include "groom/diag.h"
-#include "groom/format.h"
+#include "groom/io.h"
 #include "groom/groom.h"
 
 #ifdef __cplusplus
