@@ -200,6 +200,21 @@ GROOM_MUST_CHECK groom_status groom_evaluate_gradient(const struct groom *groom,
                                                       const struct groom_context *context,
                                                       struct groom_diag *diag);
 
+/* --- fair samples ------------------------------------------------------------ */
+
+/* A fixed permutation of 0..n-1 of which every prefix is a fair sample: the order in which a viewer
+ * shows strands, and the ones that an export of fewer takes. A function of n alone.
+ * order    [n], the caller's */
+void groom_fair_order(uint32_t n, uint32_t *order);
+
+/* The groom of these strands alone: the same guides and operators, the strands' own rows and random
+ * numbers, so that each evaluates to the same bits as in the whole.
+ * strand   [count] indices, borrowed; may repeat
+ * returns  GROOM_OK, GROOM_EINVAL (count is 0, an index out of range), GROOM_ENOMEM */
+GROOM_MUST_CHECK groom_status groom_select(const struct groom *groom, const uint32_t *strand, uint32_t count,
+                                           const struct groom_context *context, struct groom **selected,
+                                           struct groom_diag *diag);
+
 /* --- curvature parameters of guides (Eq. 10; Crane et al. 2013) ------------- */
 
 /* Per guide: root position, root angles (2), m-1 segment lengths, m-2 curvatures of each of the
