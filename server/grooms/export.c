@@ -1,0 +1,101 @@
+/* Strands of a revision, evaluated piece by piece into a file. */
+#include <stdlib.h>
+
+#include "server/grooms/room.h"
+
+/* Strands evaluated at a time: a few megabytes, enough to keep the pool busy. */
+#define PIECE_STRANDS 4096
+
+static int compare_indices(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* The first `count` strands of the fair order, back in the order of the groom. */
+static groom_status select_fairly(const struct groom *groom, uint32_t count, struct groom **selected,
+                                  struct groom_diag *diag)
+{
+    uint32_t *order = malloc(groom->n_strands * sizeof *order);
+    if (!order)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to choose %u strands", count);
+    groom_fair_order(groom->n_strands, order);
+    qsort(order, count, sizeof *order, compare_indices);
+    groom_status status = groom_select(groom, order, count, NULL, selected, diag);
+    free(order);
+    return status;
+}
+
+static groom_status write_pieces(struct grooms *grooms, const struct groom *groom, struct groom_writer *writer,
+                                 struct groom_diag *diag)
+{
+    size_t m = groom->n_vertices;
+    float(*points)[3] = malloc(PIECE_STRANDS * m * sizeof *points);
+    groom_status status = GROOM_OK;
+    if (!points)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to evaluate strands");
+    for (uint32_t first = 0; first < groom->n_strands && status == GROOM_OK; first += PIECE_STRANDS) {
+        uint32_t left = groom->n_strands - first, count = left < PIECE_STRANDS ? left : PIECE_STRANDS;
+        status = groom_evaluate(groom, first, count, points, &grooms->context, diag);
+        if (status == GROOM_OK)
+            status = groom_writer_points(writer, (const float(*)[3])points, count * m, diag);
+    }
+    free(points);
+    return status;
+}
+
+static groom_status write_groom(struct grooms *grooms, const struct groom *groom,
+                                const struct groom_write_options *options, struct groom_sink sink,
+                                struct groom_diag *diag)
+{
+    struct groom_writer *writer = NULL;
+    groom_status status = groom_writer_create(options, groom->n_strands, NULL, groom->n_vertices, sink,
+                                              &grooms->context, &writer, diag);
+    if (status == GROOM_OK)
+        status = write_pieces(grooms, groom, writer, diag);
+    if (status == GROOM_OK)
+        status = groom_writer_finish(writer, diag);
+    groom_writer_destroy(writer);
+    return status;
+}
+
+groom_status grooms_write_strands(struct grooms *grooms, const char *groom_id, const struct grooms_export *what,
+                                  struct groom_sink sink, struct groom_diag *diag)
+{
+    struct model *model = NULL;
+    struct groom *fewer = NULL;
+    groom_status status = models_acquire(grooms, groom_id, what->revision, &model, diag);
+    if (status != GROOM_OK)
+        return status;
+    if (what->count > model->groom->n_strands)
+        status = groom_fail_field(diag, GROOM_EINVAL, "/count", "the groom has %u strands: ask for at most as many",
+                                  model->groom->n_strands);
+    else if (what->count && what->count < model->groom->n_strands)
+        status = select_fairly(model->groom, what->count, &fewer, diag);
+    if (status == GROOM_OK)
+        status = write_groom(grooms, fewer ? fewer : model->groom, &what->write, sink, diag);
+    groom_destroy(fewer);
+    models_release(grooms, model);
+    return status;
+}
+
+groom_status grooms_write_guides(struct grooms *grooms, const char *groom_id, const struct grooms_export *what,
+                                 struct groom_sink sink, struct groom_diag *diag)
+{
+    struct model *model = NULL;
+    struct groom_writer *writer = NULL;
+    groom_status status = models_acquire(grooms, groom_id, what->revision, &model, diag);
+    if (status != GROOM_OK)
+        return status;
+    const struct groom *groom = model->groom;
+    status = groom_writer_create(&what->write, groom->n_guides, NULL, groom->n_vertices, sink, &grooms->context,
+                                 &writer, diag);
+    if (status == GROOM_OK)
+        status = groom_writer_points(writer, (const float(*)[3])groom->guides,
+                                     (size_t)groom->n_guides * groom->n_vertices, diag);
+    if (status == GROOM_OK)
+        status = groom_writer_finish(writer, diag);
+    groom_writer_destroy(writer);
+    models_release(grooms, model);
+    return status;
+}

@@ -1,0 +1,144 @@
+/* The service itself, and first revisions. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/grooms/room.h"
+
+#define DEFAULT_CACHE_BYTES ((size_t)512 << 20)
+
+groom_status grooms_create(const struct grooms_options *options, struct grooms **out, struct groom_diag *diag)
+{
+    struct grooms *grooms = calloc(1, sizeof *grooms);
+    if (!grooms)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for the groom service");
+    grooms->options = *options;
+    grooms->context.pool = options->pool;
+    if (models_create(options->max_cache_bytes ? options->max_cache_bytes : DEFAULT_CACHE_BYTES, &grooms->models) !=
+        GROOM_OK) {
+        free(grooms);
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for the groom service");
+    }
+    *out = grooms;
+    return GROOM_OK;
+}
+
+void grooms_destroy(struct grooms *grooms)
+{
+    if (!grooms)
+        return;
+    models_destroy(grooms->models);
+    free(grooms);
+}
+
+/* --- first revisions ---------------------------------------------------------------------- */
+
+struct grooms_kept {
+    char *document, *name;
+    struct store_array *list;
+    struct arrays arrays;
+};
+
+static groom_status set_source(cJSON *around, const struct grooms_source *source)
+{
+    cJSON *node = cJSON_CreateObject();
+    groom_status status = GROOM_ENOMEM;
+    if (node && documents_set_string(node, "strands", source->strands) == GROOM_OK &&
+        documents_set_string(node, "head", source->head) == GROOM_OK &&
+        documents_set_string(node, "job", source->job) == GROOM_OK) {
+        cJSON_DeleteItemFromObjectCaseSensitive(around, "source");
+        if (cJSON_AddItemToObject(around, "source", node))
+            return GROOM_OK;
+    }
+    cJSON_Delete(node);
+    return status;
+}
+
+/* The members around the model: what the document had, with its new identity. */
+static groom_status make_around(const char *document, size_t n_bytes, const char *groom_id,
+                                const struct grooms_source *source, char **around, struct groom_diag *diag)
+{
+    cJSON *tree;
+    groom_status status = documents_parse(document, n_bytes, &tree, diag);
+    if (status != GROOM_OK)
+        return status;
+    documents_strip_model(tree);
+    if ((status = documents_set_string(tree, "id", groom_id)) == GROOM_OK &&
+        (status = documents_set_number(tree, "revision", 1)) == GROOM_OK)
+        status = documents_set_string(tree, "parent", NULL);
+    if (status == GROOM_OK && source)
+        status = set_source(tree, source);
+    if (status == GROOM_OK && !(*around = cJSON_PrintUnformatted(tree)))
+        status = GROOM_ENOMEM;
+    cJSON_Delete(tree);
+    return status == GROOM_OK ? GROOM_OK : groom_fail(diag, status, "no memory for the groom document");
+}
+
+static groom_status write_kept(const struct groom *groom, const char *around, struct grooms_kept *kept,
+                               struct groom_diag *diag)
+{
+    struct groom_array_keeper keeper = arrays_keeper(&kept->arrays);
+    size_t n_bytes;
+    groom_status status = groom_document_write(groom, around, &keeper, &kept->document, &n_bytes, diag);
+    if (status == GROOM_OK && !(kept->name = strdup(groom->name)))
+        status = groom_fail(diag, GROOM_ENOMEM, "no memory for the groom's name");
+    return status;
+}
+
+groom_status grooms_prepare(struct grooms *grooms, const char *document, size_t n_bytes,
+                            const struct grooms_source *source, struct grooms_prepared *out,
+                            struct groom_diag *diag)
+{
+    struct grooms_prepared prepared = {0};
+    struct groom *groom = NULL;
+    char *around = NULL;
+    groom_status status;
+    prepared.kept = calloc(1, sizeof *prepared.kept);
+    if (!prepared.kept)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for a groom");
+    arrays_init(&prepared.kept->arrays, grooms->options.store);
+
+    if ((status = groom_document_read(document, n_bytes, NULL, &grooms->context, &groom, diag)) != GROOM_OK ||
+        (status = store_make_id("grm_", prepared.groom_id)) != GROOM_OK ||
+        (status = make_around(document, n_bytes, prepared.groom_id, source, &around, diag)) != GROOM_OK ||
+        (status = write_kept(groom, around, prepared.kept, diag)) != GROOM_OK ||
+        (status = arrays_list(&prepared.kept->arrays, &prepared.kept->list, &prepared.revision.n_arrays)) != GROOM_OK)
+        goto out;
+    prepared.revision.note = source && source->note ? source->note : "import";
+    *out = prepared;
+    out->revision.groom_id = out->groom_id;
+    out->revision.name = out->kept->name;
+    out->revision.document = out->kept->document;
+    out->revision.arrays = out->kept->list;
+    prepared.kept = NULL;
+out:
+    grooms_prepared_finish(&prepared);
+    groom_destroy(groom);
+    free(around);
+    return status;
+}
+
+void grooms_prepared_finish(struct grooms_prepared *prepared)
+{
+    if (prepared->kept) {
+        arrays_finish(&prepared->kept->arrays);
+        free(prepared->kept->list);
+        free(prepared->kept->document);
+        free(prepared->kept->name);
+        free(prepared->kept);
+    }
+    *prepared = (struct grooms_prepared){0};
+}
+
+groom_status grooms_import(struct grooms *grooms, const char *document, size_t n_bytes,
+                           char groom_id[STORE_ID_SIZE], struct groom_diag *diag)
+{
+    struct grooms_prepared prepared;
+    groom_status status = grooms_prepare(grooms, document, n_bytes, NULL, &prepared, diag);
+    if (status != GROOM_OK)
+        return status;
+    status = store_groom_create(grooms->options.store, &prepared.revision, diag);
+    if (status == GROOM_OK)
+        memcpy(groom_id, prepared.groom_id, STORE_ID_SIZE);
+    grooms_prepared_finish(&prepared);
+    return status;
+}
