@@ -1,6 +1,7 @@
 /* groom-worker: one process for one piece of work, so that whatever goes wrong in it ends it alone.
  *
- *   inspect, convert, check-groom   parse untrusted bytes for the daemon: standard input to standard
+ *   inspect, convert, check-groom,
+ *   render                          parse untrusted bytes for the daemon: standard input to standard
  *                                   output, in a sandbox; exit 0, or 1 with a problem on standard output
  *   attempt                         run one attempt of one job, over HTTP (proto/work.h)
  *
@@ -20,6 +21,7 @@ enum { WORKER_OK = 0, WORKER_FAILED = 1, WORKER_USAGE = 2 };
 int worker_inspect(int argc, char **argv);
 int worker_convert(int argc, char **argv);
 int worker_check_groom(int argc, char **argv);
+int worker_render(int argc, char **argv);
 int worker_attempt(int argc, char **argv);
 
 /* --- what they share ---------------------------------------------------------- */

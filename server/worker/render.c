@@ -1,0 +1,113 @@
+/* render: a shaded picture of strands, on a head where one is named. */
+#include <errno.h>
+#include <fcntl.h>
+#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "groom/format.h"
+#include "groom/mesh.h"
+#include "groom/render.h"
+#include "server/worker/worker.h"
+
+struct request {
+    const char *unit, *up, *head, *head_unit, *head_up, *view, *size;
+    struct groom_frame frame, head_frame;
+    struct groom_render_options options;
+};
+
+static int parse(int argc, char **argv, struct request *request)
+{
+    static const struct option options[] = {
+        {"unit", 1, NULL, 'u'},    {"up", 1, NULL, 'a'},      {"head", 1, NULL, 'h'}, {"head-unit", 1, NULL, 'U'},
+        {"head-up", 1, NULL, 'A'}, {"view", 1, NULL, 'v'},    {"size", 1, NULL, 's'}, {NULL, 0, NULL, 0}};
+    int c;
+    while ((c = getopt_long(argc, argv, "", options, NULL)) != -1) {
+        switch (c) {
+        case 'u': request->unit = optarg; break;
+        case 'a': request->up = optarg; break;
+        case 'h': request->head = optarg; break;
+        case 'U': request->head_unit = optarg; break;
+        case 'A': request->head_up = optarg; break;
+        case 'v': request->view = optarg; break;
+        case 's': request->size = optarg; break;
+        default: return 0;
+        }
+    }
+    if (optind == argc) return 1;
+    fprintf(stderr, "groom-worker render: \"%s\" is one argument too many\n", argv[optind]);
+    return 0;
+}
+
+static groom_status interpret(struct request *request, struct groom_diag *diag)
+{
+    unsigned long long size = 0;
+    groom_status st = worker_frame_parse(request->unit, request->up, &request->frame, diag);
+    if (st == GROOM_OK) st = worker_frame_parse(request->head_unit, request->head_up, &request->head_frame, diag);
+    if (st == GROOM_OK) st = groom_view_parse(request->view ? request->view : "front", &request->options.view, diag);
+    if (st == GROOM_OK) st = worker_count_parse("--size", request->size, GROOM_RENDER_MAX_SIZE, &size, diag);
+    request->options.size = size ? (uint32_t)size : 512;
+    return st;
+}
+
+static groom_status open_head(const struct request *request, struct worker_input *head, int *fd,
+                              struct groom_diag *diag)
+{
+    if (!request->head) return GROOM_OK;
+    *fd = open(request->head, O_RDONLY | O_CLOEXEC);
+    if (*fd < 0) return groom_fail(diag, GROOM_EIO, "the head cannot be opened: %s", strerror(errno));
+    worker_input_open(*fd, head);
+    return GROOM_OK;
+}
+
+static groom_status draw(const struct groom_strands *strands, const struct groom_mesh *mesh,
+                         const struct groom_render_options *options, const struct groom_context *context,
+                         struct groom_diag *diag)
+{
+    static const int output = STDOUT_FILENO;
+    uint8_t *rgba = malloc((size_t)options->size * options->size * 4);
+    if (!rgba) return groom_fail(diag, GROOM_ENOMEM, "no memory for a picture of %u pixels a side", options->size);
+    groom_status st = groom_render_strands(strands, mesh, options, rgba, context, diag);
+    if (st == GROOM_OK)
+        st = groom_png_write(rgba, options->size, options->size, worker_fd_sink(&output), context, diag);
+    free(rgba);
+    return st;
+}
+
+static groom_status render(const struct request *request, struct worker_input *input, struct worker_input *head,
+                           const struct groom_context *context, struct groom_diag *diag)
+{
+    struct groom_read_options read = {.frame = request->frame};
+    struct groom_mesh_read_options read_head = {.frame = request->head_frame};
+    struct groom_strands *strands = NULL;
+    struct groom_mesh *mesh = NULL;
+    groom_status st = groom_strands_read(&input->source, &read, context, &strands, NULL, diag);
+    if (st == GROOM_OK && request->head) st = groom_mesh_read(&head->source, &read_head, context, &mesh, NULL, diag);
+    if (st == GROOM_OK) st = draw(strands, mesh, &request->options, context, diag);
+    groom_strands_destroy(strands);
+    groom_mesh_destroy(mesh);
+    return st;
+}
+
+int worker_render(int argc, char **argv)
+{
+    struct request request = {0};
+    struct groom_context context = {0};
+    struct worker_input input = {0}, head = {0};
+    struct groom_diag diag = {0};
+    int head_fd = -1;
+    if (!parse(argc, argv, &request)) return WORKER_USAGE;
+    groom_status st = open_head(&request, &head, &head_fd, &diag); /* before the sandbox closes the way */
+    worker_enter_sandbox();
+    worker_input_open(STDIN_FILENO, &input);
+    if (st == GROOM_OK) st = interpret(&request, &diag);
+    if (st == GROOM_OK) st = groom_pool_create(worker_threads(), &context.pool);
+    if (st == GROOM_OK) st = render(&request, &input, &head, &context, &diag);
+    groom_pool_destroy(context.pool);
+    worker_input_close(&input);
+    worker_input_close(&head);
+    if (head_fd >= 0) close(head_fd);
+    return st == GROOM_OK ? WORKER_OK : worker_print_problem(st, &diag);
+}
