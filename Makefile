@@ -15,6 +15,9 @@ VARIANT ?= release
 BUILD   ?= build$(if $(filter-out release,$(VARIANT)),/$(VARIANT))
 PREFIX  ?= /usr/local
 FUZZ_SECONDS ?= 60
+# Set-up runs first and then a make of its own, which sees what was installed; it builds in parallel
+# unless the caller has said how.
+SUBMAKE = $(MAKE) --no-print-directory $(if $(findstring -j,$(MAKEFLAGS)),,-j$(shell nproc))
 
 WARNINGS = -Wall -Wextra -Werror -Wshadow -Wpointer-arith -Wstrict-prototypes -Wmissing-prototypes \
            -Wvla -Wwrite-strings -Wformat=2 -Wno-unused-parameter
@@ -56,9 +59,8 @@ PROGRAM_OF_client_groomctl_main.c = groomctl
 .PHONY: all setup programs lib run test unit check-all bench asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
 .DEFAULT_GOAL := all
 
-# Set-up runs first, in a make of its own, so that pkg-config sees what it installed.
 all: setup
-	@$(MAKE) --no-print-directory programs
+	@$(SUBMAKE) programs
 
 setup:
 	@deploy/setup.sh
@@ -102,10 +104,10 @@ $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(call objects,$(SUPPORT_SOURCES)) $(PA
 tests: $(UNIT_TESTS)
 
 test: setup
-	@$(MAKE) --no-print-directory check-all
+	@$(SUBMAKE) check-all
 
 check-all: programs tests fuzz-corpus node-packages
-	@$(MAKE) --no-print-directory lint
+	@$(SUBMAKE) lint
 	@BUILD=$(BUILD) tests/run.sh
 
 unit: programs tests
@@ -122,7 +124,7 @@ tests/node_modules/.installed: tests/package.json tests/package-lock.json
 
 asan tsan:
 	@deploy/setup.sh
-	@$(MAKE) --no-print-directory VARIANT=$@ programs tests node-packages
+	@$(SUBMAKE) VARIANT=$@ programs tests node-packages
 	@BUILD=build/$@ VARIANT=$@ tests/run.sh
 
 # --- fuzzing --------------------------------------------------------------------
@@ -136,7 +138,7 @@ $(FUZZ_BUILD)/fuzz_%: tests/fuzz/fuzz_%.c $(LIB_SOURCES) $(wildcard lib/*/*.h li
 	    $(INCLUDES) -o $@ $< $(LIB_SOURCES) $(LIBS_LIB) -pthread
 
 fuzz: setup
-	@$(MAKE) --no-print-directory $(addprefix $(FUZZ_BUILD)/fuzz_,$(FUZZERS))
+	@$(SUBMAKE) $(addprefix $(FUZZ_BUILD)/fuzz_,$(FUZZERS))
 	@set -e; for f in $(FUZZERS); do \
 	    mkdir -p build/fuzz/corpus/$$f; echo "fuzz: $$f for $(FUZZ_SECONDS) s"; \
 	    $(FUZZ_BUILD)/fuzz_$$f -max_total_time=$(FUZZ_SECONDS) -timeout=10 -rss_limit_mb=1024 -print_final_stats=1 \
@@ -151,14 +153,14 @@ $(BUILD)/tests/fuzz/replay_%: $(BUILD)/obj/tests/fuzz/fuzz_%.o $(BUILD)/obj/test
 # --- benchmarks, lint, run, install -------------------------------------------------
 
 bench: setup
-	@$(MAKE) --no-print-directory programs node-packages $(BENCHES)
+	@$(SUBMAKE) programs node-packages $(BENCHES)
 	@BUILD=$(BUILD) tests/bench/run.sh
 
 lint:
 	@tests/lint.sh
 
 run: setup
-	@$(MAKE) --no-print-directory programs
+	@$(SUBMAKE) programs
 	@BUILD=$(BUILD) deploy/run.sh
 
 install: programs
