@@ -86,6 +86,55 @@ GROOM_MUST_CHECK groom_status groom_superhelices_sample_at(const struct groom_su
                                                            const struct groom_context *context,
                                                            struct groom_diag *diag);
 
+/* --- from points (Section 3.5) ----------------------------------------------- */
+
+struct groom_conversion_options {
+    uint32_t n_elements;   /* of every strand; 0: as few as reach the tolerance */
+    uint32_t min_elements; /* where they are chosen */
+    uint32_t max_elements; /* where they are chosen; 0: two to a segment */
+    double tolerance_m;    /* distance of the curve from a vertex, at most; 0: 1 % of the strand's mean segment */
+    uint32_t refinements;  /* least-squares steps where the closed form misses the tolerance; 0: none */
+};
+
+/* Elements chosen (at least 6, and 3.5 a turn of the polyline), 1 % of a segment, up to 12 steps. */
+struct groom_conversion_options groom_conversion_options_default(void);
+
+/* How well one strand was met. */
+struct groom_conversion_report {
+    float error_max_m, error_rms_m; /* distance of each vertex from its place on the curve */
+    float length_change;            /* of the polyline through those places, as a fraction */
+    uint32_t n_elements;
+    uint32_t n_flips;               /* changes of handedness, where elements were made to begin */
+    uint32_t degenerate;            /* 1: no length; one straight element of length 0 stands for it */
+};
+
+/* Super-helices and the way back: the station of each vertex along its strand. */
+struct groom_conversion {
+    struct groom_superhelices *helices;
+    uint32_t n_strands, n_vertices;
+    uint32_t *first;  /* [n_strands + 1] of the strands that were converted */
+    float *at;        /* [n_vertices] 0..1: groom_superhelices_sample_at(helices, first, at, ...) gives the strands again */
+    struct groom_conversion_report *reports; /* [n_strands] */
+    const struct groom_allocator *allocator;
+};
+
+/* Polylines to super-helices: a C2 spline, point-tangents at the element breaks moved until every pair
+ * is co-helical (Derouet-Jourdan et al. 2013a), one closed-form helix a pair; where that misses the
+ * tolerance, least squares on all vertices (curvatures, lengths and root frame; the root stays), which
+ * is also what makes noise harmless: ask for fewer elements than vertices, or a tolerance above the
+ * noise. Breaks are uniform in arc length, and moved to where handedness flips; as soon as there would
+ * be as many elements as segments, they are the vertices.
+ * The root frame is Eq. 9's with k the axis farthest from the tangent.
+ * strands  borrowed; vertices finite
+ * returns  GROOM_OK, GROOM_EINVAL (a vertex is not finite; a strand has no vertex; options), GROOM_ENOMEM
+ * threads  deterministic for any pool */
+GROOM_MUST_CHECK groom_status groom_strands_convert(const struct groom_strands *strands,
+                                                    const struct groom_conversion_options *options,
+                                                    const struct groom_context *context,
+                                                    struct groom_conversion **conversion,
+                                                    struct groom_diag *diag);
+void groom_conversion_destroy(struct groom_conversion *conversion); /* takes NULL */
+
 #ifdef __cplusplus
 }
 #endif

@@ -1,0 +1,336 @@
+#include "curvature/convert_strand.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "curvature/helix.h"
+
+#define ELEMENTS_A_TURN 3.5
+/* Handedness flips where the torsion angle has gone at least this far both ways (radians). */
+#define FLIP_ANGLE 0.6
+/* Planes of less bending than this (radians) have no torsion worth the name. */
+#define LEAST_BEND 0.03
+
+uint32_t convert_max_elements(const struct groom_conversion_options *options, uint32_t n_vertices)
+{
+    if (options->n_elements)
+        return options->n_elements;
+    uint32_t most = options->max_elements ? options->max_elements : 2 * n_vertices;
+    return most > options->min_elements ? most : options->min_elements;
+}
+
+/* --- the polyline as it is ------------------------------------------------------------- */
+
+/* Vertices relative to the root; knots are those that stand apart from the one before. */
+static void load(struct convert_space *space, const float (*points)[3], uint32_t n)
+{
+    struct spline *s = &space->spline;
+    double length = 0.0;
+    for (uint32_t k = 0; k < n; k++) {
+        for (int i = 0; i < 3; i++)
+            ((double *)&space->vertex[k])[i] = (double)points[k][i] - (double)points[0][i];
+        if (k) {
+            vec3 d = vec_sub(space->vertex[k], space->vertex[k - 1]);
+            length += sqrt(vec_dot(d, d));
+        }
+    }
+    s->n = 0;
+    for (uint32_t k = 0; k < n; k++) {
+        vec3 d = s->n ? vec_sub(space->vertex[k], s->point[s->n - 1]) : (vec3){length, 0.0, 0.0};
+        double h = sqrt(vec_dot(d, d));
+        if (h > 1e-6 * length) {
+            if (s->n)
+                s->h[s->n - 1] = h;
+            s->point[s->n++] = space->vertex[k];
+        }
+        space->knot[k] = s->n ? s->n - 1 : 0;
+    }
+}
+
+static double angle_between(vec3 a, vec3 b)
+{
+    vec3 c = vec_cross(a, b);
+    return atan2(sqrt(vec_dot(c, c)), vec_dot(a, b));
+}
+
+/* All the turning of the polyline, in turns. */
+static double count_turns(const struct spline *s)
+{
+    double sum = 0.0;
+    for (uint32_t k = 1; k + 1 < s->n; k++)
+        sum += angle_between(vec_sub(s->point[k], s->point[k - 1]), vec_sub(s->point[k + 1], s->point[k]));
+    return sum / (2.0 * M_PI);
+}
+
+/* The angle by which the plane of bending turns over segment k; 0 where it is not defined (hardly any
+ * bending) or where bending changes sides (an inflection). */
+static double torsion_angle(const struct spline *s, uint32_t k)
+{
+    vec3 a = vec_sub(s->point[k], s->point[k - 1]), b = vec_sub(s->point[k + 1], s->point[k]);
+    vec3 c = vec_sub(s->point[k + 2], s->point[k + 1]);
+    vec3 n0 = vec_cross(a, b), n1 = vec_cross(b, c);
+    double la = s->h[k - 1], lb = s->h[k], lc = s->h[k + 1];
+    if (vec_dot(n0, n0) < LEAST_BEND * LEAST_BEND * la * la * lb * lb ||
+        vec_dot(n1, n1) < LEAST_BEND * LEAST_BEND * lb * lb * lc * lc)
+        return 0.0;
+    double angle = atan2(vec_dot(vec_cross(n0, n1), b) / lb, vec_dot(n0, n1));
+    return fabs(angle) < 2.0 ? angle : 0.0;
+}
+
+/* Turning points of the running torsion, with hysteresis so that noise makes none. */
+static uint32_t find_flips(struct convert_space *space)
+{
+    const struct spline *s = &space->spline;
+    double now = 0.0, high = 0.0, low = 0.0, high_at = 0.0, low_at = 0.0;
+    int side = 0; /* 1 rising, -1 falling, 0 not known yet */
+    uint32_t n = 0;
+    for (uint32_t k = 1; k + 2 < s->n; k++) {
+        now += torsion_angle(s, k);
+        if (now > high)
+            high = now, high_at = s->arc[k + 1];
+        if (now < low)
+            low = now, low_at = s->arc[k + 1];
+        int turned = side >= 0 && now < high - FLIP_ANGLE ? -1 : side <= 0 && now > low + FLIP_ANGLE ? 1 : 0;
+        if (!turned)
+            continue;
+        if (side)
+            space->flips[n++] = turned < 0 ? high_at : low_at;
+        side = turned;
+        high = low = now;
+        high_at = low_at = s->arc[k + 1];
+    }
+    return n;
+}
+
+/* --- breaks ---------------------------------------------------------------------------- */
+
+/* n elements, uniform in arc length, the nearest inner break moved to each flip. */
+static void uniform_breaks(struct convert_space *space, uint32_t n, uint32_t n_flips)
+{
+    double length = space->spline.arc[space->spline.n - 1], last = 0.0;
+    for (uint32_t i = 0; i <= n; i++)
+        space->breaks[i] = length * i / n;
+    for (uint32_t f = 0; f < n_flips; f++) {
+        double want = space->flips[f];
+        uint32_t i = (uint32_t)(want / length * n + 0.5);
+        if (i == 0 || i >= n || want - last < 0.5 * length / n)
+            continue;
+        space->breaks[i] = want;
+        last = want;
+    }
+}
+
+/* An element around each vertex. Not one to a segment: like a quadratic spline with its knots on the
+ * data, that would have to swing from vertex to vertex. */
+static uint32_t middle_breaks(struct convert_space *space)
+{
+    const struct spline *s = &space->spline;
+    space->breaks[0] = 0.0;
+    for (uint32_t k = 1; k < s->n; k++)
+        space->breaks[k] = 0.5 * (s->arc[k - 1] + s->arc[k]);
+    space->breaks[s->n] = s->arc[s->n - 1];
+    return s->n;
+}
+
+/* Two elements to each segment. */
+static uint32_t double_breaks(struct convert_space *space)
+{
+    const struct spline *s = &space->spline;
+    for (uint32_t k = 0; k + 1 < s->n; k++) {
+        space->breaks[2 * k] = s->arc[k];
+        space->breaks[2 * k + 1] = 0.5 * (s->arc[k] + s->arc[k + 1]);
+    }
+    space->breaks[2 * s->n - 2] = s->arc[s->n - 1];
+    return 2 * s->n - 2;
+}
+
+/* --- the closed form --------------------------------------------------------------------- */
+
+/* Eq. 9, k the axis farthest from the tangent. */
+static mat3 root_frame(vec3 t)
+{
+    double x = fabs(t.x), y = fabs(t.y), z = fabs(t.z);
+    vec3 k = {0.0, 0.0, 0.0};
+    if (x <= y && x <= z)
+        k.x = 1.0;
+    else if (y <= z)
+        k.y = 1.0;
+    else
+        k.z = 1.0;
+    vec3 u = vec_cross(k, t);
+    u = vec_scale(1.0 / sqrt(vec_dot(u, u)), u);
+    return (mat3){t, u, vec_cross(t, u)};
+}
+
+static void place_vertices(const struct convert_space *space, struct refine_strand *strand, uint32_t n_vertices)
+{
+    const double *arc = space->spline.arc;
+    uint32_t j = 0;
+    for (uint32_t k = 0; k < n_vertices; k++) {
+        double s = arc[space->knot[k]];
+        while (j + 1 < strand->n_elements && s > space->breaks[j + 1])
+            j++;
+        double part = (s - space->breaks[j]) / (space->breaks[j + 1] - space->breaks[j]);
+        strand->element[k] = j;
+        strand->fraction[k] = part > 0.0 ? fmin(part, 1.0) : 0.0;
+    }
+}
+
+/* Floating tangents on the breaks, then one helix after the other. */
+static void closed_form(struct convert_space *space, struct refine_strand *strand, uint32_t n)
+{
+    uint32_t segment = 0;
+    for (uint32_t i = 0; i <= n; i++)
+        spline_at(&space->spline, space->breaks[i], &segment, &space->p[i], &space->t[i]);
+    helix_float_points(n, space->p, space->t, space->work);
+    mat3 F = strand->root = root_frame(space->t[0]);
+    for (uint32_t j = 0; j < n; j++) {
+        struct helix helix = helix_through(space->p[j], space->t[j], space->p[j + 1], space->t[j + 1]);
+        vec3 q = mat_transposed_vec(F, helix.omega);
+        vec_store(q, strand->q[j]);
+        strand->length[j] = helix.length;
+        F = chain_step((struct chain_state){space->p[j], F}, q, helix.length).F;
+    }
+}
+
+/* Fit n elements on the breaks at hand into fits[which]. */
+static void fit_breaks(struct convert_space *space, uint32_t which, uint32_t n, uint32_t n_vertices,
+                       uint32_t n_steps, double tolerance)
+{
+    struct convert_fit *fit = &space->fits[which];
+    fit->strand.n_elements = n;
+    fit->strand.n_vertices = n_vertices;
+    fit->strand.vertex = space->vertex;
+    closed_form(space, &fit->strand, n);
+    place_vertices(space, &fit->strand, n_vertices);
+    fit->sum = refine_fit(&fit->strand, &space->refine, n_steps, tolerance, &fit->worst);
+}
+
+/* --- how many elements -------------------------------------------------------------------- */
+
+struct request {
+    uint32_t n_vertices, n_flips, n_steps;
+    double tolerance;
+};
+
+static int is_better(const struct convert_fit *a, const struct convert_fit *b)
+{
+    return a->worst < b->worst || !(b->worst < DBL_MAX);
+}
+
+/* Fit once more; the best so far is kept. */
+static void attempt(struct convert_space *space, const struct request *r, uint32_t n)
+{
+    uint32_t which = space->best == &space->fits[0];
+    fit_breaks(space, which, n, r->n_vertices, r->n_steps, r->tolerance);
+    if (!space->best || is_better(&space->fits[which], space->best))
+        space->best = &space->fits[which];
+}
+
+static int is_met(const struct convert_space *space, const struct request *r)
+{
+    return space->best && space->best->worst <= r->tolerance;
+}
+
+/* The error of the closed form falls with the third power of the count, roughly. */
+static uint32_t next_count(uint32_t n, double excess)
+{
+    double more = n * fmin(fmax(cbrt(excess), 1.15), 2.5);
+    return (uint32_t)ceil(more) + 1;
+}
+
+/* Uniform breaks, more and more, up to one to a vertex. */
+static void search_uniform(struct convert_space *space, const struct groom_conversion_options *options,
+                           const struct request *r, uint32_t most)
+{
+    uint32_t n = (uint32_t)ceil(ELEMENTS_A_TURN * count_turns(&space->spline));
+    n = n > options->min_elements ? n : options->min_elements;
+    most = most < space->spline.n ? most : space->spline.n;
+    while (n < most && !is_met(space, r)) {
+        uniform_breaks(space, n, r->n_flips);
+        attempt(space, r, n);
+        n = next_count(n, space->best->worst / r->tolerance);
+    }
+}
+
+static void search_count(struct convert_space *space, const struct groom_conversion_options *options,
+                         const struct request *r)
+{
+    uint32_t knots = space->spline.n, most = convert_max_elements(options, r->n_vertices);
+    search_uniform(space, options, r, most);
+    if (!is_met(space, r) && knots <= most && knots >= options->min_elements)
+        attempt(space, r, middle_breaks(space));
+    if (!is_met(space, r) && 2 * knots - 2 <= most && 2 * knots - 2 >= options->min_elements)
+        attempt(space, r, double_breaks(space));
+    if (!is_met(space, r)) {
+        uniform_breaks(space, most, r->n_flips);
+        attempt(space, r, most);
+    }
+}
+
+/* --- one strand ----------------------------------------------------------------------------- */
+
+static void stand_in(struct convert_space *space, uint32_t n_vertices)
+{
+    struct refine_strand *strand = &space->fits[0].strand;
+    space->best = &space->fits[0];
+    strand->n_elements = 1;
+    strand->n_vertices = n_vertices;
+    strand->root = root_frame((vec3){0.0, 1.0, 0.0});
+    strand->length[0] = 0.0;
+    memset(strand->q, 0, sizeof *strand->q);
+    memset(strand->element, 0, n_vertices * sizeof *strand->element);
+    memset(strand->fraction, 0, n_vertices * sizeof *strand->fraction);
+    memset(strand->fitted, 0, n_vertices * sizeof *strand->fitted);
+    space->best->sum = space->best->worst = 0.0;
+}
+
+static double polyline_length(const vec3 *p, uint32_t n)
+{
+    double sum = 0.0;
+    for (uint32_t k = 1; k < n; k++) {
+        vec3 d = vec_sub(p[k], p[k - 1]);
+        sum += sqrt(vec_dot(d, d));
+    }
+    return sum;
+}
+
+static void fill_report(const struct convert_space *space, double length, uint32_t n_flips,
+                        struct groom_conversion_report *report)
+{
+    const struct refine_strand *strand = &space->best->strand;
+    double now = polyline_length(strand->fitted, strand->n_vertices);
+    *report = (struct groom_conversion_report){
+        .error_max_m = (float)space->best->worst,
+        .error_rms_m = (float)sqrt(space->best->sum / strand->n_vertices),
+        .length_change = length > 0.0 ? (float)(now / length - 1.0) : 0.0f,
+        .n_elements = strand->n_elements,
+        .n_flips = n_flips,
+        .degenerate = space->spline.n < 2,
+    };
+}
+
+void convert_strand(struct convert_space *space, const struct groom_conversion_options *options,
+                    const float (*points)[3], uint32_t n, struct groom_conversion_report *report)
+{
+    struct request r = {.n_vertices = n, .n_steps = options->refinements};
+    load(space, points, n);
+    space->best = NULL;
+    double length = polyline_length(space->vertex, n);
+    if (space->spline.n < 2) {
+        stand_in(space, n);
+        fill_report(space, length, 0, report);
+        return;
+    }
+    spline_solve(&space->spline);
+    r.n_flips = find_flips(space);
+    r.tolerance = options->tolerance_m > 0.0 ? options->tolerance_m : 0.01 * length / (space->spline.n - 1);
+    if (options->n_elements) {
+        uniform_breaks(space, options->n_elements, r.n_flips);
+        attempt(space, &r, options->n_elements);
+    } else {
+        search_count(space, options, &r);
+    }
+    fill_report(space, length, r.n_flips, report);
+}
