@@ -40,7 +40,8 @@ GROOM_MUST_CHECK groom_status child_run(const struct child_spec *spec, struct ch
                                         struct groom_diag *diag);
 /* A started child that writes to a pipe which the caller reads: for streamed answers. stdout_fd and
  * max_output are not used; *output_fd is the caller's to close (closing it early ends the child's
- * writing). child_wait must be called once, in the thread that started it. */
+ * writing). child_wait must be called once, from any thread; what the spec points to must live until then.
+ * The wall clock runs while the caller reads: a reader that is slower than wall_ms ends the child. */
 struct child;
 GROOM_MUST_CHECK groom_status child_start(const struct child_spec *spec, struct child **child, int *output_fd,
                                           struct groom_diag *diag);

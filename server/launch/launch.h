@@ -62,8 +62,8 @@ struct launcher {
 };
 
 /* Supervised child processes of this machine, each in a process group of its own, that die when the
- * thread that started them does. A handle is "local:PID:START", START being the process's start time
- * from /proc, so that a reused pid is never taken for it. */
+ * thread that started them does. A handle is "local:PID:START:BOOT": with the process's start time and
+ * the machine's boot, a reused pid is never taken for it. */
 GROOM_MUST_CHECK groom_status launch_local_create(struct launcher **launcher, struct groom_diag *diag);
 void launch_destroy(struct launcher *launcher); /* takes NULL */
 
