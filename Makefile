@@ -25,7 +25,8 @@ FLAGS_release = -O3 -g -fno-math-errno
 FLAGS_asan    = -O1 -g -fno-math-errno -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer
 FLAGS_tsan    = -O1 -g -fno-math-errno -fsanitize=thread -fno-omit-frame-pointer
 # No contraction: the scalar, AVX2 and AVX-512 builds of one kernel must give the same bits.
-CFLAGS_ALL = -std=c11 -D_GNU_SOURCE -fPIC -pthread -ffp-contract=off -fvisibility=default \
+# Nobody reads the floating-point exception flags: without them, selections become vector blends.
+CFLAGS_ALL = -std=c11 -D_GNU_SOURCE -fPIC -pthread -ffp-contract=off -fno-trapping-math -fvisibility=default \
              $(WARNINGS) $(FLAGS_$(VARIANT)) $(CFLAGS)
 INCLUDES   = -Ilib/include -Ilib -I. -Iproto -Iserver $(CFLAGS_PACKAGES)
 # Packages may arrive in this very make run, so they are asked for when first used, once.

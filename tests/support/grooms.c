@@ -1,11 +1,21 @@
 #include "tests/support/grooms.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 
 #include "groom/random.h"
-#include "tests/support/test.h"
 
 enum stream { STREAM_GUIDE_ROOT = 1000, STREAM_GUIDE_SHAPE, STREAM_STRAND_ROOT, STREAM_PARAMETER };
+
+/* Not one of Check's assertions: benchmarks use this file too. */
+static void require(groom_status status)
+{
+    if (status == GROOM_OK)
+        return;
+    fprintf(stderr, "test groom: %s\n", groom_status_message(status));
+    abort();
+}
 
 static void place_root(struct groom_random_key key, uint32_t i, float uv[2], float root[3])
 {
@@ -35,7 +45,7 @@ static void grow_guide(struct groom_random_key key, uint32_t g, uint32_t m, floa
 struct groom *test_groom(struct groom_shape shape, uint64_t seed)
 {
     struct groom *groom;
-    ck_ok(groom_create(shape, NULL, &groom, NULL));
+    require(groom_create(shape, NULL, &groom, NULL));
     uint32_t m = shape.n_vertices;
     for (uint32_t g = 0; g < shape.n_guides; g++) {
         place_root((struct groom_random_key){seed, STREAM_GUIDE_ROOT}, g, groom->guide_uv[g], groom->guides[g * m]);
@@ -55,13 +65,13 @@ struct groom *test_groom(struct groom_shape shape, uint64_t seed)
             }
         }
     }
-    ck_ok(groom_instance_by_distance(groom, 0.0f, NULL, NULL));
+    require(groom_instance_by_distance(groom, 0.0f, NULL, NULL));
     return groom;
 }
 
 void test_append_operator(struct groom *groom, groom_operator_type type, uint64_t seed)
 {
-    ck_ok(groom_insert_operator(groom, groom->n_operators, type, seed, NULL));
+    require(groom_insert_operator(groom, groom->n_operators, type, seed, NULL));
     struct groom_operator *op = &groom->operators[groom->n_operators - 1];
     uint32_t n;
     const struct groom_operator_parameter *parameters = groom_operator_parameters(type, &n);

@@ -5,8 +5,8 @@
 #include "groom/groom.h"
 
 /* A groom of this shape whose guides are smooth random curves of about 0.3 m on a sphere of 0.1 m,
- * instanced by distance, each strand with its nearest operator guide. No operators. Fails the test
- * on error. */
+ * instanced by distance, each strand with its nearest operator guide. No operators. Aborts on
+ * error. */
 struct groom *test_groom(struct groom_shape shape, uint64_t seed);
 
 /* Append an operator with parameters drawn from sensible ranges. */

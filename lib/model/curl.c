@@ -1,0 +1,108 @@
+/* Curl: strands wind around their operator guide (Chang et al. 2025, Appendix A).
+ *   w' = max(frequency + random_frequency u1, 0) turns a metre, turn_j = s_j w' + 3.9 u2,
+ *   rho'_j = rho (0.43 + 0.79 v_j), zeta'_j = sigmoid(10 (v_j - zeta)),
+ *   x~_j = x_j + zeta'_j rho'_j (sin(2 pi turn_j) n_j + cos(2 pi turn_j) b_j), not at the root.
+ * The frame (n, b) is the operator guide's: model/frames.h. */
+#include "model/arc.h"
+#include "model/kernel.h"
+
+enum { RADIUS, FREQUENCY, RANDOM_FREQUENCY, START };
+
+#define RADIUS_AT_ROOT 0.43f
+#define RADIUS_GROWTH 0.79f
+#define RANDOM_TURNS 3.9f
+#define START_STEEPNESS 10.0f
+#define TWO_PI 6.28318531f
+
+LANES_INLINE void turning(const struct kernel_inputs *in, float *restrict rate, float *restrict shift)
+{
+    FOR_LANES(l)
+    {
+        float wanted = in->parameter[FREQUENCY] + in->parameter[RANDOM_FREQUENCY] * in->random[0][l];
+        rate[l] = wanted > 0.0f ? wanted : 0.0f;
+        shift[l] = RANDOM_TURNS * in->random[1][l];
+    }
+}
+
+LANES_INLINE void curl_forward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,
+                               lanes *restrict scratch)
+{
+    uint32_t m = in->m;
+    lanes *ell = scratch, *at = scratch + m, inverse, rate, shift;
+    float radius = in->parameter[RADIUS], start = in->parameter[START];
+    arc_measure(m, x, ell, at, inverse);
+    turning(in, rate, shift);
+    for (int c = 0; c < 3; c++)
+        FOR_LANES(l) y[c][l] = x[c][l];
+    for (uint32_t j = 1; j < m; j++) {
+        const lanes *p = x + 3 * j, *frame = in->frame + FRAME_WIDTH * j;
+        lanes *q = y + 3 * j;
+        FOR_LANES(l)
+        {
+            float v = at[j][l] * inverse[l], sine, cosine;
+            float size = radius * (RADIUS_AT_ROOT + RADIUS_GROWTH * v) * lane_sigmoid(START_STEEPNESS * (v - start));
+            lane_sincos_turns(at[j][l] * rate[l] + shift[l], &sine, &cosine);
+            float along_n = size * sine, along_b = size * cosine;
+            q[0][l] = p[0][l] + (along_n * frame[0][l] + along_b * frame[2][l]);
+            q[1][l] = p[1][l] + (along_n * frame[1][l] + along_b * frame[3][l]);
+            q[2][l] = p[2][l] + along_b * frame[4][l];
+        }
+    }
+}
+
+LANES_INLINE void curl_backward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,
+                                struct kernel_adjoints *adjoints, lanes *restrict scratch)
+{
+    uint32_t m = in->m;
+    lanes *ell = scratch, *at = scratch + m, *d_at = scratch + 2 * m, inverse, rate, shift;
+    lanes d_radius = {0}, d_rate = {0}, d_start = {0}, d_turns = {0}, d_length = {0};
+    float radius = in->parameter[RADIUS], start = in->parameter[START];
+    arc_measure(m, x, ell, at, inverse);
+    turning(in, rate, shift);
+    FOR_LANES(l) d_at[0][l] = 0.0f;
+    for (uint32_t j = 1; j < m; j++) {
+        const lanes *dp = d + 3 * j, *frame = in->frame + FRAME_WIDTH * j;
+        lanes *d_frame = adjoints->frame + FRAME_WIDTH * j;
+        FOR_LANES(l)
+        {
+            float v = at[j][l] * inverse[l], sine, cosine;
+            float growth = RADIUS_AT_ROOT + RADIUS_GROWTH * v, begun = lane_sigmoid(START_STEEPNESS * (v - start));
+            float size = radius * growth * begun;
+            lane_sincos_turns(at[j][l] * rate[l] + shift[l], &sine, &cosine);
+            float dx = dp[0][l], dy = dp[1][l], dz = dp[2][l];
+            float on_n = dx * frame[0][l] + dy * frame[1][l];
+            float on_b = dx * frame[2][l] + dy * frame[3][l] + dz * frame[4][l];
+            float along_n = size * sine, along_b = size * cosine;
+            d_frame[0][l] += along_n * dx;
+            d_frame[1][l] += along_n * dy;
+            d_frame[2][l] += along_b * dx;
+            d_frame[3][l] += along_b * dy;
+            d_frame[4][l] += along_b * dz;
+
+            float d_size = sine * on_n + cosine * on_b;
+            float d_turn = TWO_PI * (along_b * on_n - along_n * on_b);
+            float d_begun = START_STEEPNESS * (d_size * radius * growth) * (begun * (1.0f - begun));
+            float d_v = d_size * radius * begun * RADIUS_GROWTH + d_begun;
+            d_radius[l] += d_size * growth * begun;
+            d_start[l] -= d_begun;
+            d_rate[l] += d_turn * at[j][l];
+            d_turns[l] += d_turn;
+            d_at[j][l] = d_turn * rate[l] + d_v * inverse[l];
+            d_length[l] -= d_v * v * inverse[l];
+        }
+    }
+    FOR_LANES(l)
+    {
+        float wanted = rate[l] > 0.0f ? d_rate[l] : 0.0f;
+        d_at[m - 1][l] += d_length[l];
+        adjoints->parameter[RADIUS][l] = d_radius[l];
+        adjoints->parameter[FREQUENCY][l] = wanted;
+        adjoints->parameter[RANDOM_FREQUENCY][l] = wanted * in->random[0][l];
+        adjoints->parameter[START][l] = d_start[l];
+        adjoints->random[0][l] = wanted * in->parameter[RANDOM_FREQUENCY];
+        adjoints->random[1][l] = RANDOM_TURNS * d_turns[l];
+    }
+    arc_backward(m, x, ell, d_at, NULL, d);
+}
+
+KERNEL_TABLE(curl)

@@ -1,0 +1,99 @@
+/* What an operator's kernels see: a block of LANES strands. */
+#ifndef MODEL_KERNEL_H
+#define MODEL_KERNEL_H
+
+#include "groom/groom.h"
+#include "model/lanes.h"
+
+/* Numbers of an operator guide's frame at a vertex: normal x, y (its z is 0), binormal x, y, z. */
+#define FRAME_WIDTH 5
+/* ... and of its bend axes: v, and w = e x v, both unit and perpendicular to the root direction e. */
+#define AXIS_WIDTH 6
+
+struct kernel_inputs {
+    uint32_t m;         /* vertices */
+    const lanes *guide; /* [3m] operator guide relative to the strand's root; where the chain clumps */
+    const lanes *frame; /* [FRAME_WIDTH * m]; where the chain curls */
+    const lanes *axis;  /* [AXIS_WIDTH]; where the chain bends */
+    float parameter[GROOM_OPERATOR_MAX_PARAMETERS];
+    lanes random[GROOM_OPERATOR_MAX_RANDOM];
+};
+
+/* Adjoints of the above: d(loss)/d(that). */
+struct kernel_adjoints {
+    lanes *guide, *frame, *axis;                     /* added to */
+    lanes parameter[GROOM_OPERATOR_MAX_PARAMETERS];  /* overwritten */
+    lanes random[GROOM_OPERATOR_MAX_RANDOM];         /* overwritten */
+};
+
+/* y = operator(x). x, y: [3m]; scratch: [KERNEL_SCRATCH(m)]; all distinct. */
+typedef void kernel_forward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,
+                            lanes *restrict scratch);
+/* d: [3m], comes as the adjoint of y and leaves as the adjoint of x. */
+typedef void kernel_backward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,
+                             struct kernel_adjoints *adjoints, lanes *restrict scratch);
+
+#define KERNEL_SCRATCH(m) ((size_t)8 * (m))
+
+/* Instruction sets that the bodies are compiled for. */
+enum kernel_variant {
+    KERNEL_BASELINE, /* what the compiler's flags allow */
+    KERNEL_AVX2,     /* x86-64 only */
+    KERNEL_VARIANTS
+};
+
+struct operator_kernels {
+    kernel_forward *forward[KERNEL_VARIANTS];
+    kernel_backward *backward[KERNEL_VARIANTS];
+};
+
+extern const struct operator_kernels scale_kernels, bend_kernels, curl_kernels, clump_kernels, frizz_kernels;
+
+const struct operator_kernels *kernel_of(groom_operator_type type);
+
+/* The fastest variant that this processor runs. */
+enum kernel_variant kernel_best_variant(void);
+
+/* Wrap the bodies name_forward and name_backward into the table name_kernels. */
+#if defined(__x86_64__)
+#define KERNEL_TARGET_AVX2 __attribute__((target("avx2")))
+#define KERNEL_TABLE(name)                                                                                           \
+    static void name##_forward_baseline(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,   \
+                                        lanes *restrict scratch)                                                     \
+    {                                                                                                                \
+        name##_forward(in, x, y, scratch);                                                                           \
+    }                                                                                                                \
+    static void name##_backward_baseline(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,  \
+                                         struct kernel_adjoints *adjoints, lanes *restrict scratch)                  \
+    {                                                                                                                \
+        name##_backward(in, x, d, adjoints, scratch);                                                                \
+    }                                                                                                                \
+    KERNEL_TARGET_AVX2 static void name##_forward_avx2(const struct kernel_inputs *in, const lanes *restrict x,       \
+                                                       lanes *restrict y, lanes *restrict scratch)                   \
+    {                                                                                                                \
+        name##_forward(in, x, y, scratch);                                                                           \
+    }                                                                                                                \
+    KERNEL_TARGET_AVX2 static void name##_backward_avx2(const struct kernel_inputs *in, const lanes *restrict x,      \
+                                                        lanes *restrict d, struct kernel_adjoints *adjoints,         \
+                                                        lanes *restrict scratch)                                     \
+    {                                                                                                                \
+        name##_backward(in, x, d, adjoints, scratch);                                                                \
+    }                                                                                                                \
+    const struct operator_kernels name##_kernels = {{name##_forward_baseline, name##_forward_avx2},                  \
+                                                    {name##_backward_baseline, name##_backward_avx2}};
+#else
+#define KERNEL_TABLE(name)                                                                                           \
+    static void name##_forward_baseline(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,   \
+                                        lanes *restrict scratch)                                                     \
+    {                                                                                                                \
+        name##_forward(in, x, y, scratch);                                                                           \
+    }                                                                                                                \
+    static void name##_backward_baseline(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,  \
+                                         struct kernel_adjoints *adjoints, lanes *restrict scratch)                  \
+    {                                                                                                                \
+        name##_backward(in, x, d, adjoints, scratch);                                                                \
+    }                                                                                                                \
+    const struct operator_kernels name##_kernels = {{name##_forward_baseline}, {name##_backward_baseline}};
+#endif
+
+#endif

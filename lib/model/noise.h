@@ -1,0 +1,79 @@
+/* The frizz operator's noise: one-dimensional gradient noise (Perlin 1985).
+ *
+ * All of this is part of what a groom document means and never changes:
+ *   hash(i)      h = (uint32)i * 0x9e3779b1; h ^= h >> 15; h *= 0x85ebca77   (modulo 2^32)
+ *   gradient(i)  9/32 + 23/32 k / 2^23, where k is bits 8..30 of hash(i); negative where bit 31 is set.
+ *                In [-1, 1], and the mean square 0.4535 makes a strand's displacement, over the three
+ *                axes, 0.10 of the amplitude (root mean square)
+ *   fade(f)      6 f^5 - 15 f^4 + 10 f^3
+ *   noise(t)     i = floor(t), f = t - i, a = gradient(i) f, b = gradient(i + 1) (f - 1):
+ *                a + fade(f) (b - a)
+ *   epsilon^c    2/3 (noise(chi + xi^c) + 1/3 noise(2 (chi + xi^c)))
+ *   xi           0 for x, 37.3125 for y, 71.6875 for z (exact in binary; their fractions differ, so
+ *                that the three coordinates do not come to rest at the same points of a strand) */
+#ifndef MODEL_NOISE_H
+#define MODEL_NOISE_H
+
+#include "model/lanes.h"
+
+#define NOISE_OFFSETS {0.0f, 37.3125f, 71.6875f}
+
+#define NOISE_STEP 0x9e3779b1u
+
+/* Of i * NOISE_STEP, so that neighbours cost one addition. */
+LANES_INLINE uint32_t noise_hash(uint32_t stepped) { return (stepped ^ stepped >> 15) * 0x85ebca77u; }
+
+LANES_INLINE float noise_gradient(uint32_t stepped)
+{
+    uint32_t h = noise_hash(stepped);
+    float size = (float)(int32_t)(h >> 8 & 0x7fffffu) * (0.71875f * 0x1p-23f) + 0.28125f;
+    return float_of(bits_of(size) ^ (int32_t)(h & 0x80000000u));
+}
+
+struct noise_cell {
+    float f, a, b, low, high; /* place in the cell, the two ramps there, their slopes */
+};
+
+LANES_INLINE struct noise_cell noise_cell_of(float t)
+{
+    float rounded = t + ROUNDER;
+    float whole = rounded - ROUNDER;
+    int32_t above = whole > t;
+    float f = clampf(t - whole + (float)above, 0.0f, 1.0f);
+    uint32_t stepped = (uint32_t)(bits_of(rounded) - bits_of(ROUNDER) - above) * NOISE_STEP;
+    float low = noise_gradient(stepped), high = noise_gradient(stepped + NOISE_STEP);
+    return (struct noise_cell){f, low * f, high * (f - 1.0f), low, high};
+}
+
+LANES_INLINE float noise_fade(float f) { return f * f * f * (f * (f * 6.0f - 15.0f) + 10.0f); }
+
+LANES_INLINE float noise_value(float t)
+{
+    struct noise_cell cell = noise_cell_of(t);
+    return cell.a + noise_fade(cell.f) * (cell.b - cell.a);
+}
+
+/* d noise / dt, and the noise itself. */
+LANES_INLINE float noise_slope(float t, float *value)
+{
+    struct noise_cell cell = noise_cell_of(t);
+    float f = cell.f, fade = noise_fade(f), fade_slope = 30.0f * (f * f) * ((f - 1.0f) * (f - 1.0f));
+    *value = cell.a + fade * (cell.b - cell.a);
+    return cell.low + fade * (cell.high - cell.low) + fade_slope * (cell.b - cell.a);
+}
+
+/* epsilon of one axis at chi + xi, and its slope. */
+LANES_INLINE float noise_epsilon(float t)
+{
+    return (2.0f / 3.0f) * (noise_value(t) + (1.0f / 3.0f) * noise_value(2.0f * t));
+}
+
+LANES_INLINE float noise_epsilon_slope(float t, float *epsilon)
+{
+    float coarse, fine;
+    float slope = noise_slope(t, &coarse) + (2.0f / 3.0f) * noise_slope(2.0f * t, &fine);
+    *epsilon = (2.0f / 3.0f) * (coarse + (1.0f / 3.0f) * fine);
+    return (2.0f / 3.0f) * slope;
+}
+
+#endif

@@ -1,0 +1,36 @@
+/* Scale: each strand longer or shorter about its root (Chang et al. 2025, Appendix A).
+ *   x~_j = x_1 + (1 + eta u)(x_j - x_1); the root is the origin of a block's points. */
+#include "model/kernel.h"
+
+enum { RANDOM_SCALE };
+
+LANES_INLINE void scale_forward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,
+                                lanes *restrict scratch)
+{
+    (void)scratch;
+    lanes factor;
+    FOR_LANES(l) factor[l] = 1.0f + in->parameter[RANDOM_SCALE] * in->random[0][l];
+    for (uint32_t i = 0; i < 3 * in->m; i++)
+        FOR_LANES(l) y[i][l] = factor[l] * x[i][l];
+}
+
+LANES_INLINE void scale_backward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,
+                                 struct kernel_adjoints *adjoints, lanes *restrict scratch)
+{
+    (void)scratch;
+    lanes factor, d_factor = {0};
+    FOR_LANES(l) factor[l] = 1.0f + in->parameter[RANDOM_SCALE] * in->random[0][l];
+    for (uint32_t i = 0; i < 3 * in->m; i++)
+        FOR_LANES(l)
+        {
+            d_factor[l] += d[i][l] * x[i][l];
+            d[i][l] *= factor[l];
+        }
+    FOR_LANES(l)
+    {
+        adjoints->parameter[RANDOM_SCALE][l] = d_factor[l] * in->random[0][l];
+        adjoints->random[0][l] = d_factor[l] * in->parameter[RANDOM_SCALE];
+    }
+}
+
+KERNEL_TABLE(scale)

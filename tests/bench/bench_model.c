@@ -1,0 +1,94 @@
+/* The procedural model: 100 000 strands x 100 vertices, 500 guides, 125 operator guides, k = 3. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+#include "model/evaluate.h"
+#include "tests/support/grooms.h"
+#include "tests/support/reference.h"
+
+#define STRANDS 100000
+#define VERTICES 100
+#define ROUNDS 5
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void require(groom_status status)
+{
+    if (status != GROOM_OK) {
+        fprintf(stderr, "bench_model: %s\n", groom_status_message(status));
+        exit(1);
+    }
+}
+
+/* The best of a few rounds, seconds. */
+static double time_evaluate(enum kernel_variant variant, const struct groom *groom, float (*out)[3],
+                            const struct groom_context *context)
+{
+    double best = 1e9;
+    for (int round = 0; round < ROUNDS; round++) {
+        double start = now();
+        require(evaluate_with(variant, groom, 0, groom->n_strands, out, context, NULL));
+        double seconds = now() - start;
+        best = seconds < best ? seconds : best;
+    }
+    return best;
+}
+
+/* Seconds that the plain double-precision reference would take for all strands on one core. */
+static double time_reference(const struct groom *groom)
+{
+    enum { SAMPLE = 2000 };
+    struct reference *reference = reference_create(groom);
+    double (*out)[3] = malloc(VERTICES * sizeof *out), start = now();
+    for (uint32_t i = 0; i < SAMPLE; i++)
+        reference_strand(reference, i * (groom->n_strands / SAMPLE), out);
+    double seconds = (now() - start) * groom->n_strands / SAMPLE;
+    free(out);
+    reference_destroy(reference);
+    return seconds;
+}
+
+static void set_enabled(struct groom *groom, int only)
+{
+    for (uint32_t i = 0; i < groom->n_operators; i++)
+        groom->operators[i].enabled = only < 0 || (int)i == only;
+}
+
+int main(void)
+{
+    struct groom_shape shape = {STRANDS, VERTICES, 500, 125, 3};
+    struct groom *groom = test_groom(shape, 1);
+    float(*out)[3] = malloc((size_t)STRANDS * VERTICES * sizeof *out);
+    struct groom_pool *pool;
+    test_append_all_operators(groom, 1);
+    require(groom_pool_create(2, &pool));
+    struct groom_context both = {.pool = pool};
+    double vertices = (double)STRANDS * VERTICES;
+
+    double seconds = time_evaluate(kernel_best_variant(), groom, out, &both);
+    double one = time_evaluate(kernel_best_variant(), groom, out, NULL);
+    double baseline = time_evaluate(KERNEL_BASELINE, groom, out, NULL);
+    printf("figure evaluate_100k_seconds %.4f s 100 000 strands x 100, five operators, two threads\n", seconds);
+    printf("figure evaluate_100k_one_thread_seconds %.4f s one thread\n", one);
+    printf("figure evaluate_vector_ratio %.2f x baseline instruction set / best, one thread\n", baseline / one);
+    printf("figure evaluate_scalar_ratio %.1f x plain scalar reference / best, one thread\n", time_reference(groom) / one);
+    set_enabled(groom, GROOM_OPERATOR_COUNT);
+    double nothing = time_evaluate(kernel_best_variant(), groom, out, NULL);
+    printf("figure evaluate_instance_ns %.2f ns a vertex, one thread: instancing alone\n", 1e9 * nothing / vertices);
+    for (int type = 0; type < GROOM_OPERATOR_COUNT; type++) {
+        set_enabled(groom, type);
+        double alone = time_evaluate(kernel_best_variant(), groom, out, NULL) - nothing;
+        printf("figure evaluate_%s_ns %.2f ns a vertex, one thread\n", groom_operator_name((groom_operator_type)type),
+               1e9 * alone / vertices);
+    }
+    groom_pool_destroy(pool);
+    groom_destroy(groom);
+    free(out);
+    return 0;
+}
