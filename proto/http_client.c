@@ -312,6 +312,13 @@ static void note_ended(CURLM *multi, struct transfer *transfers, size_t n)
     }
 }
 
+static int vital_ended(const struct transfer *transfers, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        if (transfers[i].done && !transfers[i].stopped && transfers[i].request->is_vital) return 1;
+    return 0;
+}
+
 static double now_ms(void)
 {
     struct timespec t;
@@ -327,6 +334,7 @@ static void run(struct http_client *client, struct transfer *transfers, size_t n
         if (client->interrupted && client->interrupted(client->user)) return;
         if (curl_multi_perform(client->multi, &running) != CURLM_OK) return;
         note_ended(client->multi, transfers, n);
+        if (vital_ended(transfers, n)) return;
         if (tick && now_ms() - last >= TICK_MS) {
             tick(tick_user);
             last = now_ms();

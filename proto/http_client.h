@@ -63,6 +63,7 @@ struct http_request {
     void (*sent)(void *user, uint64_t n_sent, uint64_t n_total);
     void *user;            /* of sink, begin and sent */
     int timeout_ms;        /* of the whole call; 0: none */
+    int is_vital;          /* where this one ends by itself, http_perform_all stops the others, too */
     int idle_timeout_s;    /* no byte either way for so long is HTTP_BROKEN; 0: 60 */
 };
 
@@ -70,7 +71,8 @@ struct http_request {
 http_outcome http_perform(struct http_client *client, const struct http_request *request,
                           struct http_response *response);
 
-/* Several at once, until all have ended or `interrupted` says so. `tick` (may be NULL) is called
+/* Several at once, until all have ended, or a vital one has, or `interrupted` says so. What was
+ * stopped in that way, or by its own sink, is HTTP_INTERRUPTED. `tick` (may be NULL) is called
  * about ten times a second. outcomes[i] is set for each. */
 void http_perform_all(struct http_client *client, const struct http_request *requests, size_t n,
                       struct http_response *responses, http_outcome *outcomes,

@@ -1,0 +1,122 @@
+/* The table of commands: what usage, help and dispatch are made of. */
+#include <string.h>
+
+#include "client/groomctl/groomctl.h"
+
+const struct option_spec groomctl_global_options[] = {
+    {"server", 0, "URL", "the daemon (GROOM_SERVER; http://127.0.0.1:8080)"},
+    {"token", 0, "TOKEN", "who is asking, where the server wants to know (GROOM_TOKEN)"},
+    {"json", 0, NULL, "JSON for scripts, one object a line"},
+    {"help", 'h', NULL, "this, or a command's own help"},
+    {0},
+};
+
+#define READ_OPTIONS                                                                                  \
+    {"unit", 0, "U", "of the file: m, cm, mm, dm, in, or a number of metres (m)"},                     \
+    {"up", 0, "A", "its up axis: y or z (y)"},                                                         \
+    {"format", 0, "F", "what it is, where its bytes do not tell: hair, monohair, data, ct2hair, ply, " \
+                       "tfx, obj, json, npy, npz"},                                                    \
+    {"name", 0, "NAME", "what people call it (the file's name)"}
+
+static const struct option_spec upload_options[] = {READ_OPTIONS, {0}};
+
+static const struct option_spec fit_options[] = {
+    {"head", 0, "HEAD", "id of an uploaded head, or a file of one"},
+    {"head-file", 0, "FILE", "upload this head first"},
+    {"guides", 0, "N", "number of guides, or auto"},
+    {"operator-guides", 0, "N", "number of operator guides, or auto"},
+    {"vertices", 0, "N", "vertices of each strand (100)"},
+    {"operators", 0, "LIST", "scale,bend,curl,clump,frizz in the order wanted, or auto"},
+    {"quality", 0, "Q", "draft, standard or high"},
+    {"seed", 0, "N", "of all random numbers (1)"},
+    {"cameras", 0, "FILE", "cameras of the capture (cameras.json), for visibility"},
+    {"option", 0, "PATH=VALUE", "any other option: stages.initialize.n_smooth=40 (see: groomctl options)"},
+    {"options", 0, "FILE", "options as a JSON object; the ones above come on top"},
+    {"wait", 'w', NULL, "follow the job to its end"},
+    {"output", 'o', "FILE", "wait, then export the strands there, in the unit and axis of the upload"},
+    {"output-format", 0, "F", "of that file, where its extension does not tell"},
+    {"head-unit", 0, "U", "of the head's file, where it is not the strands'"},
+    {"head-up", 0, "A", "of the head's file, where it is not the strands'"},
+    READ_OPTIONS,
+    {0},
+};
+
+static const struct option_spec list_options[] = {
+    {"limit", 0, "N", "rows at most"},
+    {"before", 0, "N", "the page after this place (the list says it)"},
+    {"state", 0, "S", "of jobs: queued, running, succeeded, failed, cancelled"},
+    {0},
+};
+
+static const struct option_spec get_options[] = {
+    {"revision", 0, "N", "of a groom (the latest)"},
+    {"arrays", 0, NULL, "with a groom's large arrays"},
+    {"output", 'o', "FILE", "write the whole document there"},
+    {0},
+};
+
+static const struct option_spec export_options[] = {
+    {"output", 'o', "FILE", "where to; - is standard output"},
+    {"format", 0, "F", "hair, usda, ply, obj, data or json (by the file's extension)"},
+    {"guides", 0, NULL, "the guides in place of the dense strands"},
+    {"count", 0, "N", "a fair sample of so many strands"},
+    {"unit", 0, "U", "of the file (m)"},
+    {"up", 0, "A", "of the file (y)"},
+    {"revision", 0, "N", "the latest where not given"},
+    {0},
+};
+
+static const struct option_spec preview_options[] = {
+    {"output", 'o', "FILE", "where to, a PNG; - is standard output"},
+    {"view", 0, "V", "front, side, back or top"},
+    {"size", 0, "N", "pixels of a side"},
+    {"revision", 0, "N", "the latest where not given"},
+    {0},
+};
+
+static const struct option_spec edit_options[] = {
+    {"if-match", 0, "N", "refuse unless the latest revision is this one"},
+    {0},
+};
+
+static const struct option_spec sample_options[] = {
+    {"output", 'o', "FOLDER", "gets strands.hair, head.obj, truth.groom.json and cameras.json"},
+    {"style", 0, "S", "straight, wavy, curly, coily, short, spiky or bent (curly)"},
+    {"strands", 0, "N", "of the truth"},
+    {"vertices", 0, "N", "of each strand"},
+    {"guides", 0, "N", "of the truth"},
+    {"seed", 0, "N", "another head of hair (1)"},
+    {"clean", 0, NULL, "without the defects of a capture"},
+    {0},
+};
+
+#define MANY ARGUMENTS_MAX
+const struct command groomctl_commands[] = {
+    {"upload", "FILE", 1, 1, upload_options, "upload dense strands", command_upload},
+    {"upload-head", "FILE", 1, 1, upload_options, "upload a head or body mesh (OBJ, PLY)", command_upload_head},
+    {"fit", "STRANDS|FILE", 1, 1, fit_options, "fit a procedural groom; with -o all the way from file to file", command_fit},
+    {"status", "JOB...", 1, MANY, NULL, "where jobs stand", command_status},
+    {"watch", "JOB...", 1, MANY, NULL, "follow jobs live, to their ends", command_watch},
+    {"cancel", "JOB...", 1, MANY, NULL, "stop jobs", command_cancel},
+    {"losses", "JOB", 1, 1, NULL, "the loss curves of a job", command_losses},
+    {"list", "strands|heads|jobs|grooms", 1, 1, list_options, "what is on the server, newest first", command_list},
+    {"get", "ID", 1, 1, get_options, "all about strands, a head, a job or a groom", command_get},
+    {"export", "GROOM|STRANDS", 1, 1, export_options, "strands or guides into a file", command_export},
+    {"preview", "GROOM", 1, 1, preview_options, "a shaded picture", command_preview},
+    {"set", "GROOM /POINTER=VALUE...", 2, MANY, edit_options, "change a groom: /operators/2/radius=0.01", command_set},
+    {"patch", "GROOM FILE", 2, 2, edit_options, "change a groom by a JSON Patch or merge patch", command_patch},
+    {"revisions", "GROOM", 1, 1, NULL, "the history of a groom", command_revisions},
+    {"revert", "GROOM REVISION", 2, 2, edit_options, "a new revision that is the same as an earlier one", command_revert},
+    {"import", "FILE", 1, 1, NULL, "a groom document of another server", command_import},
+    {"sample", "", 0, 0, sample_options, "make a reconstruction with known truth, without a server", command_sample},
+    {"options", "", 0, 0, NULL, "every option of a fit, with its default", command_options},
+    {"health", "", 0, 0, NULL, "whether the server is alive and ready", command_health},
+    {0},
+};
+
+const struct command *groomctl_find_command(const char *name)
+{
+    for (const struct command *c = groomctl_commands; c->name; c++)
+        if (!strcmp(c->name, name)) return c;
+    return NULL;
+}
