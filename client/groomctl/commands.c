@@ -34,6 +34,7 @@ static const struct option_spec fit_options[] = {
     {"options", 0, "FILE", "options as a JSON object; the ones above come on top"},
     {"wait", 'w', NULL, "follow the job to its end"},
     {"output", 'o', "FILE", "wait, then export the strands there, in the unit and axis of the upload"},
+    {"groom-id-file", 0, "FILE", "wait, then write the groom's id there, for scripts"},
     {"output-format", 0, "F", "of that file, where its extension does not tell"},
     {"head-unit", 0, "U", "of the head's file, where it is not the strands'"},
     {"head-up", 0, "A", "of the head's file, where it is not the strands'"},

@@ -142,12 +142,20 @@ static int export_result(struct groomctl *ctl, const struct arguments *arguments
     return status;
 }
 
+static int write_id(const char *groom, const char *path)
+{
+    char line[80];
+    int n = snprintf(line, sizeof line, "%s\n", groom);
+    return output_file_save(path, line, (size_t)n) ? DONE : REFUSED;
+}
+
 static int follow(struct groomctl *ctl, const struct arguments *arguments, const char *job)
 {
     const char *path = argument(arguments, "output");
     struct job_view view;
     job_view_init(&view, job);
     int status = jobs_watch_all(ctl, &view, 1);
+    if (status == DONE && argument(arguments, "groom-id-file")) status = write_id(view.groom, argument(arguments, "groom-id-file"));
     return status == DONE && path ? export_result(ctl, arguments, view.groom, path) : status;
 }
 
@@ -155,7 +163,7 @@ static int run(struct groomctl *ctl, const struct arguments *arguments, cJSON *o
 {
     char strands[64] = "", head[64] = "";
     const char *head_name = argument(arguments, "head-file") ? argument(arguments, "head-file") : argument(arguments, "head");
-    int waits = argument(arguments, "wait") || argument(arguments, "output");
+    int waits = argument(arguments, "wait") || argument(arguments, "output") || argument(arguments, "groom-id-file");
     cJSON *job = NULL;
     int status = resolve(ctl, arguments, SIZED_HAIR, arguments->operands[0], strands);
     if (status == DONE && head_name) status = resolve(ctl, arguments, SIZED_HEAD, head_name, head);
