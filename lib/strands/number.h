@@ -1,0 +1,27 @@
+/* Decimal numbers from text and into text, independent of the locale. */
+#ifndef STRANDS_NUMBER_H
+#define STRANDS_NUMBER_H
+
+#include <stddef.h>
+
+/* The number at `text`, which ends in a byte that is no part of a number (the input's zero byte):
+ * [+-] digits [. digits] [e [+-] digits], with a digit at least before or after the point.
+ * Correctly rounded where the digits without point are below 2^53 and the power of ten within 22
+ * (every %.9g float); otherwise within 0.51 units in the last place of a double.
+ * returns  the first byte after it, or NULL where no number stands there */
+const unsigned char *number_scan(const unsigned char *text, double *value);
+
+/* The same for nan, inf and infinity in either case, which files do hold. */
+const unsigned char *number_scan_special(const unsigned char *text, double *value);
+
+/* A whole number of up to 18 digits with an optional sign. */
+const unsigned char *number_scan_integer(const unsigned char *text, long long *value);
+
+#define NUMBER_MAX 24
+/* Writes what printf's %.9g writes, without the terminating zero; returns the length (below NUMBER_MAX). */
+size_t number_print(char *out, float value);
+
+/* Decimal digits of a whole number (at most 20); returns the length. */
+size_t number_print_integer(char *out, unsigned long long value);
+
+#endif

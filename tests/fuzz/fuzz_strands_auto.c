@@ -1,0 +1,4 @@
+/* the recogniser, and whichever reader it chooses */
+#include "tests/fuzz/strands_target.h"
+
+FUZZ_STRANDS(GROOM_FORMAT_AUTO)

@@ -1,0 +1,3 @@
+#include "tests/fuzz/strands_target.h"
+
+FUZZ_STRANDS(GROOM_FORMAT_TFX)
