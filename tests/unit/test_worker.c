@@ -1,5 +1,6 @@
 /* What an attempt reads and what it makes of the daemon's answers. */
 #include <arpa/inet.h>
+#include <errno.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -224,6 +225,30 @@ START_TEST(problem_carries_offset_and_pointer)
 }
 END_TEST
 
+static void *nothing(void *argument)
+{
+    return argument;
+}
+
+START_TEST(sandbox_leaves_threads_and_memory_and_no_way_out)
+{
+    char *const no_words[] = {NULL};
+    pthread_t thread;
+    worker_enter_sandbox();
+    ck_assert_int_eq(socket(AF_INET, SOCK_STREAM, 0), -1);
+    ck_assert_int_eq(errno, EPERM);
+    ck_assert_int_eq(execve("/bin/true", no_words, no_words), -1);
+    ck_assert_int_eq(errno, EPERM);
+    ck_assert_int_eq(unlink("/tmp/nothing"), -1);
+    ck_assert_int_eq(errno, EPERM);
+    ck_assert_int_eq(pthread_create(&thread, NULL, nothing, NULL), 0);
+    pthread_join(thread, NULL);
+    void *memory = malloc(64 << 20);
+    ck_assert_ptr_nonnull(memory);
+    free(memory);
+}
+END_TEST
+
 START_TEST(input_is_read_whole_from_a_pipe_within_its_limit)
 {
     int ends[2];
@@ -251,4 +276,5 @@ TEST_SUITE("worker", order_reads_inputs_options_and_checkpoint, order_refuses_wh
            link_leaves_quietly_when_fenced, link_tells_a_refusal_with_its_detail, link_stops_waiting_when_the_process_is_to_end,
            blob_is_verified_and_a_broken_line_taken_up_again, blob_of_other_bytes_is_refused,
            blob_comes_from_a_shared_folder_where_there_is_one, counts_are_whole_numbers_in_range,
-           problem_carries_offset_and_pointer, input_is_read_whole_from_a_pipe_within_its_limit)
+           problem_carries_offset_and_pointer,
+           sandbox_leaves_threads_and_memory_and_no_way_out, input_is_read_whole_from_a_pipe_within_its_limit)
