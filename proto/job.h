@@ -23,9 +23,9 @@ int job_state_is_end(job_state state);
 
 /* Events of GET /v1/jobs/{id}/events; each carries a JSON object and an increasing id.
  *   stage     {"name","index","count"}
- *   progress  {"stage":{...},"progress":0..1,"eta_s":seconds|null}
- *   loss      {"stage","iteration","name","value"}
- *   state     {"state","result":{"groom"}?,"error":{problem}?} */
+ *   progress  {"stage":"name","progress":0..1,"eta_s":seconds?}
+ *   loss      {"stage":"name","losses":[{"stage"?,"iteration","name","value"},...]}
+ *   state     {"state",...} */
 #define JOB_EVENT_STAGE    "stage"
 #define JOB_EVENT_PROGRESS "progress"
 #define JOB_EVENT_LOSS     "loss"

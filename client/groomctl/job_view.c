@@ -62,11 +62,17 @@ void job_view_resource(struct job_view *view, const cJSON *job)
     view->queue_position = (int)api_number(job, "queue_position", -1);
 }
 
+/* Of the curves that a loss event brings the first one's latest value is shown. */
 static void take_loss(struct job_view *view, const cJSON *data)
 {
-    snprintf(view->loss_name, sizeof view->loss_name, "%.31s", api_text(data, "name"));
-    view->loss = api_number(data, "value", view->loss);
-    view->has_loss = view->loss_name[0] != '\0';
+    const cJSON *losses = cJSON_GetObjectItemCaseSensitive(data, "losses"), *loss;
+    const char *name = api_text(cJSON_GetArrayItem(losses, 0), "name");
+    if (!name[0]) return;
+    snprintf(view->loss_name, sizeof view->loss_name, "%.31s", name);
+    view->has_loss = 1;
+    cJSON_ArrayForEach(loss, losses) {
+        if (!strcmp(api_text(loss, "name"), name)) view->loss = api_number(loss, "value", view->loss);
+    }
 }
 
 int job_view_event(struct job_view *view, const char *event, const cJSON *data)

@@ -107,13 +107,23 @@ static groom_status take_up(struct attempt *a)
 
 /* --- the work ---------------------------------------------------------------------------------- */
 
+/* A checkpoint that cannot be kept (the daemon's disk is full) costs safety, not the job. */
+static groom_status save(struct attempt *a)
+{
+    struct groom_diag diag = {0};
+    groom_status st = checkpoints_save(&a->checkpoints, a->fit, 0, &a->link, &diag);
+    if (st == GROOM_OK || st == GROOM_ECANCELLED) return st;
+    fprintf(stderr, "groom-worker: warning: a checkpoint was not taken: %s\n", diag.detail);
+    return GROOM_OK;
+}
+
 static groom_status work(struct attempt *a)
 {
     groom_status st = progress_report_send(&a->report, 1);
     while (st == GROOM_OK && !groom_fit_done(a->fit)) {
         uint32_t stage = checkpoints_stage(a->fit);
         st = groom_fit_step(a->fit, &a->context, &a->diag);
-        if (st == GROOM_OK) st = checkpoints_save(&a->checkpoints, a->fit, 0, &a->link, &a->diag);
+        if (st == GROOM_OK) st = save(a);
         if (st == GROOM_OK) st = progress_report_send(&a->report, checkpoints_stage(a->fit) != stage);
     }
     return st;

@@ -26,8 +26,8 @@ static void add_stage(cJSON *message, const struct groom_fit_progress *progress)
 static void add_time_left(cJSON *message, const struct progress_report *report, double fraction, double now_s)
 {
     double share = fraction - report->first_fraction;
-    if (share < SMALLEST_SHARE) return;
-    cJSON_AddNumberToObject(message, "eta_s", round(10 * (now_s - report->started_s) * (1 - fraction) / share) / 10);
+    if (share >= SMALLEST_SHARE)
+        cJSON_AddNumberToObject(message, "eta_s", round(10 * (now_s - report->started_s) * (1 - fraction) / share) / 10);
 }
 
 static void add_losses(cJSON *message, const struct progress_report *report)
