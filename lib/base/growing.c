@@ -29,7 +29,7 @@ static int grow(struct growing *array, size_t capacity, const struct groom_alloc
 
 void *growing_add(struct growing *array, size_t n, const struct groom_allocator *allocator)
 {
-    if (n > array->capacity - array->count) {
+    if (!array->items || n > array->capacity - array->count) {
         size_t wanted, doubled = array->capacity < SIZE_MAX / 2 ? array->capacity * 2 : SIZE_MAX;
         if (__builtin_add_overflow(array->count, n, &wanted))
             return NULL;

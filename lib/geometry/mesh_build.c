@@ -126,12 +126,12 @@ static void cutter_finish(struct cutter *cutter)
 /* The corners of a face without repetitions of the one before, into the cutter; 0 where one is not finite. */
 static int take_corners(struct cutter *cutter, const struct mesh_face *face, uint32_t *n_out)
 {
-    const struct mesh_corner *corners = (const struct mesh_corner *)cutter->build->corners.items + face->first;
+    const struct mesh_corner *corners = cutter->build->corners.items;
     const float(*points)[3] = cutter->build->points.items;
     const float(*uvs)[2] = cutter->build->uvs.items;
     uint32_t n = 0;
     for (uint32_t i = 0; i < face->n; i++) {
-        struct mesh_corner c = corners[i];
+        struct mesh_corner c = corners[face->first + i];
         if (!is_finite_point(points[c.vertex]))
             return 0;
         if (n && cutter->corner_vertex[n - 1] == c.vertex)

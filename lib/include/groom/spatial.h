@@ -59,7 +59,7 @@ int groom_bvh_occluded(const struct groom_bvh *bvh, const float origin[3], const
 
 /* How often the surface winds around a point: 1 inside a closed surface, 0 outside; for an open one
  * (a head cut at the neck) a smooth number between (Jacobson et al. 2013, by the tree of Barill et
- * al. 2018, Eq. 15; within about 0.01 of the exact sum). 0 for a point that is not finite. */
+ * al. 2018, Eq. 15; within about 0.05 of the exact sum). 0 for a point that is not finite. */
 float groom_bvh_winding(const struct groom_bvh *bvh, const float point[3]);
 
 /* |winding| > 1/2: right for closed, open, doubled, self-intersecting and inside-out surfaces alike. */
