@@ -46,6 +46,9 @@ GROOM_MUST_CHECK groom_status jobs_cancel(struct jobs *jobs, const char *id, str
 GROOM_MUST_CHECK groom_status jobs_events_since(struct jobs *jobs, const char *id, int64_t after, uint32_t limit,
                                                 struct store_event_list *list, struct groom_diag *diag);
 
+/* Remove the blobs that no row refers to; a running daemon may call it any time. */
+GROOM_MUST_CHECK groom_status jobs_collect_blobs(struct jobs *jobs, uint64_t *n_removed, struct groom_diag *diag);
+
 /* --- waiting without blocking ------------------------------------------------------------ */
 
 /* Called after every change of the job that leaves an event (state, stage, progress, loss). From any
@@ -58,6 +61,8 @@ GROOM_MUST_CHECK groom_status jobs_watch(struct jobs *jobs, const char *id, jobs
                                          struct jobs_watch **watch);
 /* When this returns the waker is not running and never will again. Takes NULL. */
 void jobs_unwatch(struct jobs *jobs, struct jobs_watch *watch);
+/* How many are watching, for /metrics. */
+size_t jobs_watching(struct jobs *jobs);
 /* Wake everybody: for the daemon's end, so that suspended connections can be closed. */
 void jobs_wake_all(struct jobs *jobs);
 

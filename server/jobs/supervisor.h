@@ -24,6 +24,7 @@ struct supervisor_options {
     uint32_t cancel_grace_ms;       /* until SIGTERM, and again until SIGKILL; 0: 1000 */
     struct launcher *launcher;      /* borrowed */
     const char *const *worker_argv; /* NULL-terminated: {"…/groom-worker", "attempt", NULL}; borrowed */
+    const char *const *worker_env;  /* more of its environment, NULL-terminated "NAME=value"; NULL: none */
     const char *work_url;           /* "http://127.0.0.1:PORT"; borrowed */
     const char *log_folder;         /* stderr of attempts: <log_folder>/<job>.<attempt>.log; is made */
     struct launch_limits limits;    /* of each attempt */

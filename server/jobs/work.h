@@ -55,7 +55,8 @@ GROOM_MUST_CHECK groom_status work_checkpoint(struct jobs *jobs, const struct st
  * returns  GROOM_ECONFLICT, GROOM_ECANCELLED, and what store_groom_create returns */
 GROOM_MUST_CHECK groom_status work_result(struct jobs *jobs, const struct store_attempt_ref *ref,
                                           const struct store_revision_new *groom, struct groom_diag *diag);
-/* The job has failed for good with this problem object (JSON). returns  GROOM_EINVAL, GROOM_ECONFLICT */
+/* The job has failed for good with this problem object (JSON). returns  GROOM_EINVAL, GROOM_ECONFLICT,
+ *          GROOM_ECANCELLED (it was told to stop: it has only to exit) */
 GROOM_MUST_CHECK groom_status work_failed(struct jobs *jobs, const struct store_attempt_ref *ref,
                                           const char *body, size_t n_body, struct groom_diag *diag);
 

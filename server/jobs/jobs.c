@@ -1,0 +1,201 @@
+#include "server/jobs/jobs.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/jobs/queue.h"
+#include "server/jobs/work.h"
+
+groom_status jobs_create(struct store *store, struct blobs *blobs, struct jobs **jobs, struct groom_diag *diag)
+{
+    struct jobs *made = calloc(1, sizeof *made);
+    if (!made)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for the queue");
+    made->store = store;
+    made->blobs = blobs;
+    pthread_mutex_init(&made->lock, NULL);
+    *jobs = made;
+    return GROOM_OK;
+}
+
+void jobs_destroy(struct jobs *jobs)
+{
+    if (!jobs)
+        return;
+    pthread_mutex_destroy(&jobs->lock);
+    free(jobs);
+}
+
+/* --- watching ------------------------------------------------------------------------- */
+
+groom_status jobs_watch(struct jobs *jobs, const char *id, jobs_waker waker, void *user,
+                        struct jobs_watch **watch)
+{
+    struct jobs_watch *made = calloc(1, sizeof *made);
+    if (!made)
+        return GROOM_ENOMEM;
+    strncpy(made->job_id, id, sizeof made->job_id - 1);
+    made->waker = waker;
+    made->user = user;
+    pthread_mutex_lock(&jobs->lock);
+    made->next = jobs->watches;
+    jobs->watches = made;
+    pthread_mutex_unlock(&jobs->lock);
+    *watch = made;
+    return GROOM_OK;
+}
+
+void jobs_unwatch(struct jobs *jobs, struct jobs_watch *watch)
+{
+    if (!watch)
+        return;
+    pthread_mutex_lock(&jobs->lock);
+    struct jobs_watch **at = &jobs->watches;
+    while (*at && *at != watch)
+        at = &(*at)->next;
+    if (*at)
+        *at = watch->next;
+    pthread_mutex_unlock(&jobs->lock);
+    free(watch);
+}
+
+size_t jobs_watching(struct jobs *jobs)
+{
+    size_t n = 0;
+    pthread_mutex_lock(&jobs->lock);
+    for (const struct jobs_watch *watch = jobs->watches; watch; watch = watch->next)
+        n++;
+    pthread_mutex_unlock(&jobs->lock);
+    return n;
+}
+
+/* job_id NULL: all. The lock is held over the waker, so that jobs_unwatch waits for it. */
+static void wake(struct jobs *jobs, const char *job_id)
+{
+    pthread_mutex_lock(&jobs->lock);
+    for (struct jobs_watch *watch = jobs->watches; watch; watch = watch->next)
+        if (!job_id || strcmp(watch->job_id, job_id) == 0)
+            watch->waker(watch->user);
+    pthread_mutex_unlock(&jobs->lock);
+}
+
+void jobs_notify(struct jobs *jobs, const char *job_id) { wake(jobs, job_id); }
+void jobs_wake_all(struct jobs *jobs) { wake(jobs, NULL); }
+
+void jobs_set_nudge(struct jobs *jobs, void (*nudge)(void *user), void *user)
+{
+    pthread_mutex_lock(&jobs->lock);
+    jobs->nudge = nudge;
+    jobs->nudge_user = user;
+    pthread_mutex_unlock(&jobs->lock);
+}
+
+static void nudge(struct jobs *jobs)
+{
+    pthread_mutex_lock(&jobs->lock);
+    if (jobs->nudge)
+        jobs->nudge(jobs->nudge_user);
+    pthread_mutex_unlock(&jobs->lock);
+}
+
+/* --- moving ------------------------------------------------------------------------------ */
+
+static groom_status is_referenced(void *user, const char *sha256, bool *referenced)
+{
+    return store_blob_referenced(user, sha256, referenced, NULL);
+}
+
+void jobs_drop_blob(struct jobs *jobs, const char *sha256)
+{
+    if (!sha256[0])
+        return;
+    groom_status status = blobs_collect(jobs->blobs, sha256, is_referenced, jobs->store, NULL, NULL);
+    (void)status; /* garbage that stays is collected later */
+}
+
+groom_status jobs_collect_blobs(struct jobs *jobs, uint64_t *n_removed, struct groom_diag *diag)
+{
+    return blobs_collect_all(jobs->blobs, is_referenced, jobs->store, n_removed, diag);
+}
+
+groom_status jobs_move(struct jobs *jobs, const struct store_job_move *move, struct groom_diag *diag)
+{
+    char garbage[STORE_HASH_SIZE] = "";
+    groom_status status = store_job_move(jobs->store, move, garbage, diag);
+    if (status != GROOM_OK)
+        return status;
+    jobs_drop_blob(jobs, garbage);
+    jobs_notify(jobs, move->job_id);
+    nudge(jobs);
+    return GROOM_OK;
+}
+
+/* --- what HTTP calls ------------------------------------------------------------------------ */
+
+/* What an idempotency key stands for. */
+static groom_status hash_request(const struct jobs_request *request, char hash[STORE_HASH_SIZE])
+{
+    size_t n_kind = strlen(request->kind) + 1, n_inputs = strlen(request->inputs) + 1;
+    size_t n_options = strlen(request->options) + 1;
+    char *all = malloc(n_kind + n_inputs + n_options);
+    if (!all)
+        return GROOM_ENOMEM;
+    memcpy(all, request->kind, n_kind);
+    memcpy(all + n_kind, request->inputs, n_inputs);
+    memcpy(all + n_kind + n_inputs, request->options, n_options);
+    work_hash(all, n_kind + n_inputs + n_options, hash);
+    free(all);
+    return GROOM_OK;
+}
+
+groom_status jobs_submit(struct jobs *jobs, const struct jobs_request *request, struct store_job *job,
+                         bool *created, struct groom_diag *diag)
+{
+    char id[STORE_ID_SIZE], hash[STORE_HASH_SIZE];
+    struct store_job_new row = {.id = id, .kind = request->kind, .request = request->inputs,
+                                .options = request->options, .priority = request->priority,
+                                .idempotency_key = request->idempotency_key, .request_hash = hash};
+    char present[STORE_ID_SIZE];
+    groom_status status;
+    if ((status = store_make_id("job_", id)) != GROOM_OK || (status = hash_request(request, hash)) != GROOM_OK)
+        return groom_fail(diag, status, "a job could not be made");
+    if ((status = store_job_create(jobs->store, &row, present, created, diag)) != GROOM_OK)
+        return status;
+    nudge(jobs);
+    return store_job_get(jobs->store, present, job, diag);
+}
+
+groom_status jobs_get(struct jobs *jobs, const char *id, struct store_job *job, struct groom_diag *diag)
+{
+    return store_job_get(jobs->store, id, job, diag);
+}
+
+groom_status jobs_list(struct jobs *jobs, const enum store_job_state *state, struct store_page page,
+                       struct store_job_list *list, struct groom_diag *diag)
+{
+    return store_jobs_list(jobs->store, state, page, list, diag);
+}
+
+/* A queued job may be taken between the look and the move: then it is a running one's turn. */
+groom_status jobs_cancel(struct jobs *jobs, const char *id, struct store_job *job, struct groom_diag *diag)
+{
+    enum store_job_state state;
+    groom_status status;
+    do {
+        if ((status = store_job_request_cancel(jobs->store, id, &state, diag)) != GROOM_OK)
+            return status;
+        if (state == STORE_JOB_QUEUED) {
+            struct store_job_move move = {.job_id = id, .from = state, .to = STORE_JOB_CANCELLED};
+            status = jobs_move(jobs, &move, diag);
+        } else if (state == STORE_JOB_RUNNING) {
+            nudge(jobs);
+        }
+    } while (status == GROOM_ECONFLICT);
+    return status == GROOM_OK ? store_job_get(jobs->store, id, job, diag) : status;
+}
+
+groom_status jobs_events_since(struct jobs *jobs, const char *id, int64_t after, uint32_t limit,
+                               struct store_event_list *list, struct groom_diag *diag)
+{
+    return store_events_since(jobs->store, id, after, limit, list, diag);
+}

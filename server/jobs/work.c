@@ -1,0 +1,236 @@
+/* What an attempt may ask and tell; its progress is in work_progress.c. */
+#include "server/jobs/work.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+
+#include <cjson/cJSON.h>
+#include <openssl/evp.h>
+
+#include "server/jobs/queue.h"
+
+/* --- tokens ---------------------------------------------------------------------------- */
+
+static void write_hex(const unsigned char *bytes, char hex[65])
+{
+    for (int i = 0; i < 32; i++)
+        snprintf(hex + 2 * i, 3, "%02x", bytes[i]);
+}
+
+void work_hash(const void *bytes, size_t n_bytes, char hash[STORE_HASH_SIZE])
+{
+    unsigned char digest[EVP_MAX_MD_SIZE] = {0};
+    EVP_Digest(bytes, n_bytes, digest, NULL, EVP_sha256(), NULL);
+    write_hex(digest, hash);
+}
+
+groom_status work_token_make(char token[WORK_TOKEN_SIZE], char hash[STORE_HASH_SIZE])
+{
+    unsigned char random[32];
+    if (getrandom(random, sizeof random, 0) != (ssize_t)sizeof random)
+        return GROOM_EIO;
+    write_hex(random, token);
+    work_hash(token, strlen(token), hash);
+    return GROOM_OK;
+}
+
+/* Found by its hash: how long the search takes says nothing of the token. */
+groom_status work_authenticate(struct jobs *jobs, const char *token, struct store_attempt_ref *ref,
+                               struct groom_diag *diag)
+{
+    char hash[STORE_HASH_SIZE];
+    work_hash(token, strlen(token), hash);
+    return store_attempt_find(jobs->store, hash, ref, diag);
+}
+
+/* --- what is to be done ------------------------------------------------------------------ */
+
+static const struct {
+    const char *name;
+    enum store_asset_kind kind;
+} inputs[] = {{"strands", STORE_STRANDS}, {"head", STORE_HEAD}};
+#define N_INPUTS (sizeof inputs / sizeof inputs[0])
+
+/* The upload that a request names as its ith input; *found false where it names none. */
+static groom_status read_input(struct jobs *jobs, const cJSON *request, size_t i, struct store_asset *asset,
+                               bool *found, struct groom_diag *diag)
+{
+    const cJSON *id = cJSON_GetObjectItemCaseSensitive(request, inputs[i].name);
+    *found = cJSON_IsString(id);
+    return *found ? store_asset_get(jobs->store, inputs[i].kind, id->valuestring, asset, diag) : GROOM_OK;
+}
+
+static void add_input(cJSON *object, const char *name, const struct store_asset *asset)
+{
+    char up[2] = {asset->up, 0};
+    cJSON *input = cJSON_AddObjectToObject(object, name);
+    cJSON_AddStringToObject(input, "id", asset->id);
+    cJSON_AddStringToObject(input, "sha256", asset->sha256);
+    cJSON_AddNumberToObject(input, "bytes", (double)asset->n_bytes);
+    cJSON_AddStringToObject(input, "format", asset->format);
+    cJSON_AddNumberToObject(input, "unit_m", asset->unit_m);
+    cJSON_AddStringToObject(input, "up", up);
+    cJSON_AddStringToObject(input, "name", asset->name);
+}
+
+static groom_status add_inputs(struct jobs *jobs, const cJSON *request, cJSON *object, struct groom_diag *diag)
+{
+    for (size_t i = 0; i < N_INPUTS; i++) {
+        struct store_asset asset = {0};
+        bool found = false;
+        groom_status status = read_input(jobs, request, i, &asset, &found, diag);
+        if (status != GROOM_OK)
+            return status;
+        if (found)
+            add_input(object, inputs[i].name, &asset);
+        store_asset_finish(&asset);
+    }
+    return GROOM_OK;
+}
+
+static groom_status add_checkpoint(struct jobs *jobs, const char *job_id, cJSON *object, struct groom_diag *diag)
+{
+    struct store_checkpoint checkpoint;
+    groom_status status = store_checkpoint_get(jobs->store, job_id, &checkpoint, diag);
+    if (status == GROOM_ENOTFOUND) {
+        cJSON_AddNullToObject(object, "checkpoint");
+        return GROOM_OK;
+    }
+    if (status != GROOM_OK)
+        return status;
+    cJSON *item = cJSON_AddObjectToObject(object, "checkpoint");
+    cJSON_AddStringToObject(item, "sha256", checkpoint.sha256);
+    cJSON_AddNumberToObject(item, "bytes", (double)checkpoint.n_bytes);
+    cJSON_AddNumberToObject(item, "stage", checkpoint.stage);
+    return GROOM_OK;
+}
+
+groom_status work_describe(struct jobs *jobs, const struct store_attempt_ref *ref, char **text,
+                           struct groom_diag *diag)
+{
+    struct store_job job = {0};
+    groom_status status = store_job_get(jobs->store, ref->job_id, &job, diag);
+    if (status != GROOM_OK)
+        return status;
+    cJSON *object = cJSON_CreateObject(), *request = cJSON_Parse(job.request);
+    cJSON_AddStringToObject(object, "job", job.id);
+    cJSON_AddStringToObject(object, "kind", job.kind);
+    cJSON_AddNumberToObject(object, "attempt", ref->number);
+    cJSON_AddItemToObject(object, "options", cJSON_Parse(job.options));
+    status = add_inputs(jobs, request, cJSON_AddObjectToObject(object, "inputs"), diag);
+    cJSON_AddItemToObject(object, "request", request);
+    if (status == GROOM_OK)
+        status = add_checkpoint(jobs, job.id, object, diag);
+    char *printed = status == GROOM_OK ? cJSON_PrintUnformatted(object) : NULL;
+    cJSON_Delete(object);
+    store_job_finish(&job);
+    if (status == GROOM_OK && !printed)
+        status = groom_fail(diag, GROOM_ENOMEM, "no memory to describe a job");
+    if (status == GROOM_OK)
+        *text = printed;
+    return status;
+}
+
+static groom_status is_input(struct jobs *jobs, const cJSON *request, const char *sha256, bool *is,
+                             struct groom_diag *diag)
+{
+    for (size_t i = 0; i < N_INPUTS; i++) {
+        struct store_asset asset = {0};
+        bool found = false;
+        groom_status status = read_input(jobs, request, i, &asset, &found, diag);
+        if (status != GROOM_OK)
+            return status;
+        *is |= found && strcmp(asset.sha256, sha256) == 0;
+        store_asset_finish(&asset);
+    }
+    return GROOM_OK;
+}
+
+groom_status work_may_read(struct jobs *jobs, const struct store_attempt_ref *ref, const char *sha256,
+                           struct groom_diag *diag)
+{
+    struct store_job job = {0};
+    struct store_checkpoint checkpoint = {0};
+    bool may = false;
+    groom_status status = store_job_get(jobs->store, ref->job_id, &job, diag);
+    if (status != GROOM_OK)
+        return status;
+    cJSON *request = cJSON_Parse(job.request);
+    status = is_input(jobs, request, sha256, &may, diag);
+    cJSON_Delete(request);
+    store_job_finish(&job);
+    if (status == GROOM_OK && !may &&
+        (status = store_checkpoint_get(jobs->store, ref->job_id, &checkpoint, diag)) == GROOM_OK)
+        may = strcmp(checkpoint.sha256, sha256) == 0;
+    if (status == GROOM_OK && !may)
+        status = GROOM_ENOTFOUND;
+    if (status == GROOM_ENOTFOUND)
+        return groom_fail(diag, status, "this job has no blob %.64s", sha256);
+    return status;
+}
+
+/* --- what it hands in ------------------------------------------------------------------------ */
+
+groom_status work_checkpoint(struct jobs *jobs, const struct store_attempt_ref *ref, const char *sha256,
+                             uint64_t n_bytes, uint32_t stage, struct groom_diag *diag)
+{
+    struct store_checkpoint checkpoint = {.n_bytes = n_bytes, .stage = stage};
+    char replaced[STORE_HASH_SIZE] = "";
+    strncpy(checkpoint.sha256, sha256, STORE_HASH_SIZE - 1);
+    groom_status status = store_attempt_checkpoint(jobs->store, ref, &checkpoint, replaced, diag);
+    blobs_unpin(jobs->blobs, sha256);
+    jobs_drop_blob(jobs, status == GROOM_OK ? replaced : sha256);
+    return status;
+}
+
+groom_status work_result(struct jobs *jobs, const struct store_attempt_ref *ref,
+                         const struct store_revision_new *groom, struct groom_diag *diag)
+{
+    char result[96];
+    snprintf(result, sizeof result, "{\"groom\":\"%.31s\",\"revision\":1}", groom->groom_id);
+    struct store_job_move move = {.job_id = ref->job_id, .from = STORE_JOB_RUNNING, .to = STORE_JOB_SUCCEEDED,
+                                  .attempt = ref->number, .attempt_state = STORE_ATTEMPT_SUCCEEDED,
+                                  .result = result, .groom = groom};
+    return jobs_move(jobs, &move, diag);
+}
+
+/* A problem object, printed anew: what is kept is JSON whatever was sent. */
+static groom_status read_problem(const char *body, size_t n_body, char **text, struct groom_diag *diag)
+{
+    cJSON *problem = cJSON_ParseWithLength(body, n_body);
+    bool good = cJSON_IsObject(problem) &&
+                cJSON_IsString(cJSON_GetObjectItemCaseSensitive(problem, "type")) &&
+                cJSON_IsString(cJSON_GetObjectItemCaseSensitive(problem, "detail"));
+    char *printed = good ? cJSON_PrintUnformatted(problem) : NULL;
+    cJSON_Delete(problem);
+    if (!good)
+        return groom_fail(diag, GROOM_EINVAL, "a failure is a problem object with the strings type and detail");
+    if (!printed)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for a problem");
+    *text = printed;
+    return GROOM_OK;
+}
+
+groom_status work_failed(struct jobs *jobs, const struct store_attempt_ref *ref, const char *body, size_t n_body,
+                         struct groom_diag *diag)
+{
+    struct store_job job = {0};
+    char *problem = NULL;
+    groom_status status = store_job_get(jobs->store, ref->job_id, &job, diag);
+    bool cancelled = status == GROOM_OK && job.cancel_requested;
+    store_job_finish(&job);
+    if (cancelled) /* it stopped because it was told to: the supervisor says so once it is gone */
+        return groom_fail(diag, GROOM_ECANCELLED, "the job's cancellation was asked for");
+    if (status == GROOM_OK)
+        status = read_problem(body, n_body, &problem, diag);
+    if (status != GROOM_OK)
+        return status;
+    struct store_job_move move = {.job_id = ref->job_id, .from = STORE_JOB_RUNNING, .to = STORE_JOB_FAILED,
+                                  .attempt = ref->number, .attempt_state = STORE_ATTEMPT_FAILED,
+                                  .error = problem};
+    status = jobs_move(jobs, &move, diag);
+    cJSON_free(problem);
+    return status;
+}
