@@ -1,6 +1,7 @@
 /* The procedural model: 100 000 strands x 100 vertices, 500 guides, 125 operator guides, k = 3. */
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 
 #include "model/evaluate.h"
@@ -54,6 +55,29 @@ static double time_reference(const struct groom *groom)
     return seconds;
 }
 
+static void copy_adjoint(void *user, uint32_t first, uint32_t n, const float (*points)[3], float (*d_points)[3])
+{
+    (void)user;
+    (void)first;
+    memcpy(d_points, points, (size_t)n * VERTICES * sizeof *points);
+}
+
+static double time_gradient(const struct groom *groom, const struct groom_context *context)
+{
+    struct groom_gradient *gradient;
+    double best = 1e9;
+    require(groom_gradient_create(groom, NULL, &gradient, NULL));
+    for (int round = 0; round < ROUNDS; round++) {
+        double start = now();
+        require(groom_evaluate_gradient(groom, NULL, groom->n_strands, (struct groom_adjoint){copy_adjoint, NULL},
+                                        gradient, context, NULL));
+        double seconds = now() - start;
+        best = seconds < best ? seconds : best;
+    }
+    groom_gradient_destroy(gradient);
+    return best;
+}
+
 static void set_enabled(struct groom *groom, int only)
 {
     for (uint32_t i = 0; i < groom->n_operators; i++)
@@ -75,6 +99,9 @@ int main(void)
     double one = time_evaluate(kernel_best_variant(), groom, out, NULL);
     double baseline = time_evaluate(KERNEL_BASELINE, groom, out, NULL);
     printf("figure evaluate_100k_seconds %.4f s 100 000 strands x 100, five operators, two threads\n", seconds);
+    double gradient = time_gradient(groom, &both);
+    printf("figure gradient_100k_seconds %.4f s forward and backward, two threads\n", gradient);
+    printf("figure gradient_ratio %.2f x gradient / forward\n", gradient / seconds);
     printf("figure evaluate_100k_one_thread_seconds %.4f s one thread\n", one);
     printf("figure evaluate_vector_ratio %.2f x baseline instruction set / best, one thread\n", baseline / one);
     printf("figure evaluate_scalar_ratio %.1f x plain scalar reference / best, one thread\n", time_reference(groom) / one);

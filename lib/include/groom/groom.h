@@ -163,37 +163,51 @@ GROOM_MUST_CHECK groom_status groom_evaluate(const struct groom *groom, uint32_t
                                              struct groom_diag *diag);
 
 /* The gradient of a scalar with respect to everything that a fit moves (reverse mode, exact).
- * Arrays may be NULL where not wanted. groom_gradient_create allocates all. */
+ * groom_gradient_create allocates all arrays; set one to NULL (and keep it, to put it back before
+ * groom_gradient_destroy) where it is not wanted. */
 struct groom_gradient {
-    float (*guides)[3];        /* [n_g * m] */
+    float (*guides)[3];        /* [n_g * m], through instancing and through operator guides */
     float *instancing_weight;  /* [n * k], of the weights as stored (no renormalisation) */
     struct groom_operator_gradient {
         double parameter[GROOM_OPERATOR_MAX_PARAMETERS];
         float *random[GROOM_OPERATOR_MAX_RANDOM]; /* like groom_operator.random */
-    } *operators;              /* [n_operators] */
+        groom_operator_type type;                 /* whose gradient it is */
+    } *operators;              /* [n_operators]; zero for a disabled one */
     const struct groom_allocator *allocator;
     struct groom_shape shape;
     uint32_t n_operators;
 };
 
+/* For this groom, until its chain changes. Owned by the caller.
+ * returns  GROOM_OK, GROOM_ENOMEM */
 GROOM_MUST_CHECK groom_status groom_gradient_create(const struct groom *groom,
                                                     const struct groom_context *context,
                                                     struct groom_gradient **gradient,
                                                     struct groom_diag *diag);
 void groom_gradient_destroy(struct groom_gradient *gradient); /* takes NULL */
 
-/* Forward and backward in one pass over the strands.
- * strand    [count] indices of the strands to visit, or NULL for all n (then count = n)
- * adjoint   called for each piece of strands after forward evaluation, from any thread of the pool:
- *           reads points [n_piece][m][3] (strands piece_first.. of the visiting order) and writes
- *           d(loss)/d(points) into d_points of the same shape
- * gradient  overwritten
- * threads   same bits for any pool */
+/* How many strands an adjoint sees at once. */
+#define GROOM_GRADIENT_PIECE 16
+
+/* evaluate  called once for each piece of at most GROOM_GRADIENT_PIECE strands, after their forward
+ *           evaluation, from any thread of the pool: reads points [n_piece][m][3] (strands piece_first..
+ *           of the visiting order; piece_first is a multiple of GROOM_GRADIENT_PIECE) and writes
+ *           d(loss)/d(points) into d_points of the same shape, every element. A loss that is summed
+ *           in the same order everywhere keeps one partial sum a piece. */
 struct groom_adjoint {
     void (*evaluate)(void *user, uint32_t piece_first, uint32_t n_piece, const float (*points)[3],
                      float (*d_points)[3]);
     void *user;
 };
+
+/* Forward and backward in one pass over the strands. Where a derivative does not exist (segments and
+ * strands of no length, a curl that stands still at a frequency of 0) it is 0 for that term.
+ * groom     borrowed; has passed groom_validate
+ * strand    [count] indices of the strands to visit, each at most once, or NULL for all n (then
+ *           count = n)
+ * gradient  made for this groom and this chain; overwritten
+ * returns   GROOM_OK, GROOM_EINVAL (an index or count out of range, another chain), GROOM_ENOMEM
+ * threads   same bits for any pool */
 GROOM_MUST_CHECK groom_status groom_evaluate_gradient(const struct groom *groom, const uint32_t *strand,
                                                       uint32_t count, struct groom_adjoint adjoint,
                                                       struct groom_gradient *gradient,
