@@ -68,7 +68,7 @@ int builder_reserve(struct builder *builder, uint64_t n_strands, uint64_t n_vert
 
 /* --- points ------------------------------------------------------------------- */
 
-/* Metres and y up; what is too far away becomes infinite and falls with its strand. */
+/* Metres and y up; what is too far away (or NaN) gets an infinite x, and falls with its strand. */
 static inline void convert(const struct builder *builder, float out[3], double x, double y, double z)
 {
     double a = x * builder->unit_m, b = y * builder->unit_m, c = z * builder->unit_m;
@@ -76,6 +76,40 @@ static inline void convert(const struct builder *builder, float out[3], double x
     out[0] = near ? (float)a : INFINITY;
     out[1] = (float)(builder->z_up ? c : b);
     out[2] = (float)(builder->z_up ? -b : c);
+}
+
+/* The same for packed floats, in loops that the compiler vectorizes. */
+static void scale_packed(const struct builder *builder, float *out, const unsigned char *bytes, size_t n)
+{
+    memcpy(out, bytes, n * sizeof *out);
+    if (builder->unit_m != 1)
+        for (size_t i = 0; i < n; i++)
+            out[i] = (float)(out[i] * builder->unit_m);
+}
+
+static int all_near(const float *values, size_t n)
+{
+    const float farthest = (float)BUILDER_FARTHEST_M;
+    uint32_t limit, far = 0;
+    memcpy(&limit, &farthest, sizeof limit);
+    for (size_t i = 0; i < n; i++) { /* of positive floats the bits are in order, NaN last */
+        uint32_t bits;
+        memcpy(&bits, &values[i], sizeof bits);
+        far |= (bits & 0x7fffffff) > limit;
+    }
+    return !far;
+}
+
+static void convert_records(const struct builder *builder, float (*out)[3], const unsigned char *bytes, size_t n,
+                            size_t stride)
+{
+    if (stride == sizeof *out && !builder->z_up) {
+        scale_packed(builder, out[0], bytes, 3 * n);
+        if (all_near(out[0], 3 * n))
+            return;
+    }
+    for (size_t i = 0; i < n; i++, bytes += stride)
+        convert(builder, out[i], (double)input_f32(bytes), (double)input_f32(bytes + 4), (double)input_f32(bytes + 8));
 }
 
 static int make_room(struct builder *builder)
@@ -102,9 +136,8 @@ int builder_points_f32(struct builder *builder, const unsigned char *bytes, uint
             return 0;
         uint64_t room = builder->points.n_room - builder->points.n;
         uint64_t span = chunks_span(builder->points.n, n < room ? n : room);
-        float(*out)[3] = chunks_at(&builder->points, builder->points.n);
-        for (uint64_t i = 0; i < span; i++, bytes += stride)
-            convert(builder, out[i], input_f32(bytes), input_f32(bytes + 4), input_f32(bytes + 8));
+        convert_records(builder, chunks_at(&builder->points, builder->points.n), bytes, span, stride);
+        bytes += span * stride;
         builder->points.n += span;
         n -= span;
     }
@@ -124,22 +157,39 @@ int builder_repeat(struct builder *builder, uint64_t index)
 
 enum verdict { KEEP, SHORT, NOT_FINITE, NO_LENGTH };
 
-/* Of no length means that every vertex is where the first one is. */
-static enum verdict judge(const struct builder *builder, uint64_t n)
+/* Is every x finite? convert() has put what is wrong with a point there. */
+static int is_finite(const struct builder *builder, uint64_t begin, uint64_t end)
 {
-    if (n < 2)
-        return SHORT;
-    const float *root = chunks_at(&builder->points, builder->n_cut);
-    int finite = 1, moves = 0;
-    for (uint64_t i = builder->n_cut, end = i + n, span; i < end; i += span) {
+    int finite = 1;
+    for (uint64_t i = begin, span; i < end; i += span) {
         span = chunks_span(i, end - i);
         const float(*points)[3] = chunks_at(&builder->points, i);
-        for (uint64_t j = 0; j < span; j++) {
-            finite &= isfinite(points[j][0]) && isfinite(points[j][1]) && isfinite(points[j][2]);
-            moves |= points[j][0] != root[0] || points[j][1] != root[1] || points[j][2] != root[2];
-        }
+        for (uint64_t j = 0; j < span; j++)
+            finite &= points[j][0] < INFINITY;
     }
-    return !finite ? NOT_FINITE : !moves ? NO_LENGTH : KEEP;
+    return finite;
+}
+
+/* Of no length means that every vertex is where the first one is. */
+static int has_length(const struct builder *builder, uint64_t begin, uint64_t end)
+{
+    const float *root = chunks_at(&builder->points, begin);
+    for (uint64_t i = begin + 1; i < end; i++) {
+        const float *point = chunks_at(&builder->points, i);
+        if (point[0] != root[0] || point[1] != root[1] || point[2] != root[2])
+            return 1;
+    }
+    return 0;
+}
+
+static enum verdict judge(const struct builder *builder, uint64_t n)
+{
+    uint64_t begin = builder->n_cut, end = begin + n;
+    if (n < 2)
+        return SHORT;
+    if (!is_finite(builder, begin, end))
+        return NOT_FINITE;
+    return has_length(builder, begin, end) ? KEEP : NO_LENGTH;
 }
 
 /* Close the gap that dropped strands have left; the target is never behind the source. */

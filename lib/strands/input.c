@@ -9,17 +9,17 @@ groom_status input_init(struct input *input, const struct groom_source *source,
                         const struct groom_context *context, struct groom_diag *diag)
 {
     *input = (struct input){.source = *source, .context = context};
-    input->buffer = memory_array(memory_allocator(context), INPUT_CAPACITY + 1, 1);
+    input->buffer = memory_array(memory_allocator(context), INPUT_CAPACITY + INPUT_PADDING, 1);
     if (!input->buffer)
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the input buffer");
-    input->buffer[0] = 0;
+    memset(input->buffer, 0, INPUT_PADDING);
     return GROOM_OK;
 }
 
 void input_finish(struct input *input)
 {
     if (input->buffer)
-        memory_release(memory_allocator(input->context), input->buffer, INPUT_CAPACITY + 1, 1);
+        memory_release(memory_allocator(input->context), input->buffer, INPUT_CAPACITY + INPUT_PADDING, 1);
     input->buffer = NULL;
 }
 
@@ -51,7 +51,7 @@ static void read_some(struct input *input)
         input->at_end = 1;
     else
         input->end += (size_t)n;
-    input->buffer[input->end] = 0;
+    memset(input->buffer + input->end, 0, INPUT_PADDING);
 }
 
 size_t input_fill(struct input *input, size_t n)

@@ -1,7 +1,7 @@
 /* Buffered input: a source seen through a window of fixed size, with the offset of every byte.
  *
- * The window holds INPUT_CAPACITY bytes and is followed by a zero byte, so that a scanner may run
- * to the end of it without counting. Failures of the source and a cancelled context are kept, and
+ * The window holds INPUT_CAPACITY bytes and is followed by zero bytes, so that a scanner may run
+ * to the end of it without counting, and read eight bytes at once. Failures of the source and a cancelled context are kept, and
  * are what every later call answers. */
 #ifndef STRANDS_INPUT_H
 #define STRANDS_INPUT_H
@@ -12,11 +12,12 @@
 #include "groom/format.h"
 
 #define INPUT_CAPACITY 65536
+#define INPUT_PADDING 16
 
 struct input {
     struct groom_source source;
     const struct groom_context *context;
-    unsigned char *buffer; /* [INPUT_CAPACITY + 1], buffer[end] = 0 */
+    unsigned char *buffer; /* [INPUT_CAPACITY + INPUT_PADDING], zero from buffer[end] on */
     size_t at, end;        /* unread: buffer[at .. end - 1] */
     uint64_t base;         /* offset in the source of buffer[0] */
     int at_end;            /* the source has given its last byte */

@@ -1,6 +1,7 @@
 /* Float to text, the same bytes as printf's %.9g and several times faster.
  *
- * Nine digits of m * 2^e are found exactly in 128-bit integers: for 10^-27 <= |x| as
+ * Nine digits of m * 2^e are found exactly in integers, of 64 bits for what coordinates usually are
+ * and of 128 otherwise: for 10^-27 <= |x| as
  * floor(m * 5^k * 2^(e+k)) with its remainder, where 10^8 <= x * 10^k < 10^9, rounded half to even
  * as printf does. What is smaller is left to snprintf. */
 #include <math.h>
@@ -14,14 +15,15 @@ typedef unsigned __int128 u128;
 
 /* 5^k for k < 45: 103 bits at most, so that 24 bits of mantissa may join it (35 is the largest here). */
 
+static const uint64_t powers_of_five[28] = {
+    1, 5, 25, 125, 625, 3125, 15625, 78125, 390625, 1953125, 9765625, 48828125, 244140625, 1220703125,
+    6103515625, 30517578125, 152587890625, 762939453125, 3814697265625, 19073486328125, 95367431640625,
+    476837158203125, 2384185791015625, 11920928955078125, 59604644775390625, 298023223876953125,
+    1490116119384765625, 7450580596923828125};
+
 static u128 power_of_five(unsigned k)
 {
-    static const uint64_t small[28] = {
-        1, 5, 25, 125, 625, 3125, 15625, 78125, 390625, 1953125, 9765625, 48828125, 244140625, 1220703125,
-        6103515625, 30517578125, 152587890625, 762939453125, 3814697265625, 19073486328125, 95367431640625,
-        476837158203125, 2384185791015625, 11920928955078125, 59604644775390625, 298023223876953125,
-        1490116119384765625, 7450580596923828125};
-    return k < 28 ? small[k] : (u128)small[27] * small[k - 27];
+    return k < 28 ? powers_of_five[k] : (u128)powers_of_five[27] * powers_of_five[k - 27];
 }
 
 /* quotient of value / 2^shift, rounded half to even */
@@ -41,8 +43,17 @@ static uint64_t divide_rounding(u128 value, u128 divisor)
     return (uint64_t)quotient + (rest * 2 > divisor || (rest * 2 == divisor && (quotient & 1)));
 }
 
-/* m * 2^e * 10^k, rounded to a whole number */
-static uint64_t scaled(uint32_t m, int e, int k)
+/* m * 2^e * 10^k, rounded to a whole number: 0 <= k <= 13, so that m * 5^k has 55 bits at most, and e + k < 0 */
+static inline uint64_t scaled_small(uint32_t m, int e, int k)
+{
+    unsigned shift = (unsigned)-(e + k);
+    uint64_t value = m * powers_of_five[k], quotient = value >> shift;
+    uint64_t rest = value - (quotient << shift), half = (uint64_t)1 << (shift - 1);
+    return quotient + (rest > half || (rest == half && (quotient & 1)));
+}
+
+/* The same for any k. */
+static uint64_t scaled_large(uint32_t m, int e, int k)
 {
     if (k >= 0) {
         u128 value = (u128)m * power_of_five((unsigned)k);
@@ -51,6 +62,11 @@ static uint64_t scaled(uint32_t m, int e, int k)
     /* x >= 10^9: m * 2^e / 10^-k, where m * 2^e < 2^128 */
     u128 divisor = power_of_five((unsigned)-k);
     return e + k < 0 ? divide_rounding(m, divisor << -(e + k)) : divide_rounding((u128)m << (e + k), divisor);
+}
+
+static inline uint64_t scaled(uint32_t m, int e, int k)
+{
+    return k >= 0 && k <= 13 && e + k < 0 && e + k > -64 ? scaled_small(m, e, k) : scaled_large(m, e, k);
 }
 
 static const char digit_pairs[201] =

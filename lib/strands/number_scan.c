@@ -54,9 +54,23 @@ static const unsigned char *scan_exponent(const unsigned char *text, int *expone
     return p;
 }
 
-const unsigned char *number_scan(const unsigned char *p, double *value)
+/* Eight digits at once, in a 64-bit register: pairs, then fours, then all (little-endian). */
+static inline int scan_eight(const unsigned char *p, uint64_t *digits)
 {
-    uint64_t digits = 0;
+    uint64_t block, digit;
+    memcpy(&block, p, sizeof block);
+    digit = block - UINT64_C(0x3030303030303030);
+    if (((block + UINT64_C(0x4646464646464646)) | digit) & UINT64_C(0x8080808080808080))
+        return 0;
+    digit = digit * 10 + (digit >> 8);
+    *digits = (((digit & UINT64_C(0x000000ff000000ff)) * UINT64_C(0x000f424000000064)) +
+               ((digit >> 16 & UINT64_C(0x000000ff000000ff)) * UINT64_C(0x0000271000000001))) >> 32;
+    return 1;
+}
+
+static inline const unsigned char *scan(const unsigned char *p, double *value, int padded)
+{
+    uint64_t digits = 0, eight;
     int exponent = 0, negative = *p == '-';
     const unsigned char *first, *point;
     if (*p == '-' || *p == '+')
@@ -71,6 +85,11 @@ const unsigned char *number_scan(const unsigned char *p, double *value)
     size_t n_digits = (size_t)(p - first);
     if (*p == '.') {
         point = ++p;
+        while (padded && digits < UINT64_C(10000000000) && scan_eight(p, &eight)) {
+            digits = digits * 100000000 + eight;
+            exponent -= 8;
+            p += 8;
+        }
         for (; is_digit(*p); p++)
             if (digits < DIGITS_LIMIT) {
                 digits = digits * 10 + (*p - '0');
@@ -87,6 +106,9 @@ const unsigned char *number_scan(const unsigned char *p, double *value)
         *value = -*value;
     return p;
 }
+
+const unsigned char *number_scan(const unsigned char *text, double *value) { return scan(text, value, 0); }
+const unsigned char *number_scan_padded(const unsigned char *text, double *value) { return scan(text, value, 1); }
 
 static int matches(const unsigned char *text, const char *word)
 {

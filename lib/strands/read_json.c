@@ -46,7 +46,7 @@ static inline groom_status read_coordinate(struct json *json, double *value)
     struct text *text = &json->text;
     if (text->end - text->p >= TEXT_LOOKAHEAD) {
         const unsigned char *p = text->p + (*text->p == ' ');
-        const unsigned char *after = *p == '+' ? NULL : number_scan(p, value);
+        const unsigned char *after = *p == '+' ? NULL : number_scan_padded(p, value);
         if (after && after != text->end) {
             text->p = after;
             return GROOM_OK;

@@ -403,6 +403,8 @@ static groom_status read_edges(struct ply *ply, const struct element *element)
         return groom_fail_at(ply->reader->diag, GROOM_EFORMAT, (int64_t)offset(ply),
                              "one element \"edge\" with vertex1 and vertex2 was expected, after \"vertex\"");
     ply->edges_found = 1;
+    if (ply->strands_found && !ply->ascii && !element->n_lists)
+        return input_skip(ply->reader->in, element->n * element->row_bytes, "an edge", ply->reader->diag);
     for (uint64_t i = 0; status == GROOM_OK && i < element->n; i++) {
         uint32_t a = 0, b = 0;
         if ((status = read_row(ply, element)) != GROOM_OK ||

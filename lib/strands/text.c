@@ -74,7 +74,7 @@ static int accept(struct text *text, const unsigned char *after)
 int text_number(struct text *text, double *value)
 {
     text_ready(text);
-    const unsigned char *after = number_scan(text->p, value);
+    const unsigned char *after = number_scan_padded(text->p, value);
     return accept(text, after ? after : number_scan_special(text->p, value));
 }
 

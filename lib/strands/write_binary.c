@@ -81,19 +81,34 @@ static groom_status begin_ply(struct groom_writer *writer)
     return writer_bytes(writer, header, n);
 }
 
+/* From each vertex of a strand to the next, a block at a time. */
+static groom_status write_strand_edges(struct groom_writer *writer, int32_t vertex, uint32_t n_edges)
+{
+    enum { AT_ONCE = 256 };
+    int32_t edges[AT_ONCE][2];
+    while (n_edges > 0) {
+        uint32_t now = n_edges < AT_ONCE ? n_edges : AT_ONCE;
+        for (uint32_t i = 0; i < now; i++, vertex++) {
+            edges[i][0] = vertex;
+            edges[i][1] = vertex + 1;
+        }
+        groom_status status = writer_bytes(writer, edges, now * sizeof edges[0]);
+        if (status != GROOM_OK)
+            return status;
+        n_edges -= now;
+    }
+    return GROOM_OK;
+}
+
 static groom_status write_edges(struct groom_writer *writer)
 {
     int32_t vertex = 0;
-    for (uint32_t i = 0; i < writer->n_strands; i++, vertex++)
-        for (uint32_t left = writer_count(writer, i) - 1; left > 0; left--, vertex++) {
-            groom_status status = GROOM_OK;
-            int32_t edge[2] = {vertex, vertex + 1};
-            unsigned char *p = writer_room(writer, sizeof edge, &status);
-            if (!p)
-                return status;
-            memcpy(p, edge, sizeof edge);
-            writer_used(writer, sizeof edge);
-        }
+    for (uint32_t i = 0; i < writer->n_strands; i++) {
+        groom_status status = write_strand_edges(writer, vertex, writer_count(writer, i) - 1);
+        if (status != GROOM_OK)
+            return status;
+        vertex += (int32_t)writer_count(writer, i);
+    }
     return GROOM_OK;
 }
 

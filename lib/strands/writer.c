@@ -56,32 +56,34 @@ groom_status writer_text(struct groom_writer *writer, const char *text)
 
 /* --- points --------------------------------------------------------------------------- */
 
-void writer_convert(const struct groom_writer *writer, float out[3], const float in[3])
+/* Packed floats in the file's frame, in loops that the compiler vectorizes. */
+static void convert_packed(const struct groom_writer *writer, float *restrict out, const float (*restrict points)[3], size_t n)
 {
-    int z_up = writer->up == GROOM_UP_Z;
-    out[0] = (float)(in[0] / writer->unit_m);
-    out[1] = (float)((z_up ? -in[2] : in[1]) / writer->unit_m);
-    out[2] = (float)((z_up ? in[1] : in[2]) / writer->unit_m);
+    const float *in = points[0];
+    double per_metre = writer->per_metre;
+    if (writer->up == GROOM_UP_Y)
+        for (size_t i = 0; i < 3 * n; i++)
+            out[i] = (float)(in[i] * per_metre);
+    else
+        for (size_t i = 0; i < n; i++) {
+            out[3 * i] = (float)(points[i][0] * per_metre);
+            out[3 * i + 1] = (float)(-points[i][2] * per_metre);
+            out[3 * i + 2] = (float)(points[i][1] * per_metre);
+        }
 }
 
 groom_status writer_points_f32(struct groom_writer *writer, const float (*points)[3], size_t n)
 {
-    if (writer->unit_m == 1 && writer->up == GROOM_UP_Y)
+    enum { AT_ONCE = 1024 };
+    float converted[3 * AT_ONCE];
+    if (writer->is_plain)
         return writer_bytes(writer, points, n * sizeof *points);
     while (n > 0) {
-        groom_status status;
-        size_t room = (WRITER_BUFFER - writer->used) / sizeof *points, now = n < room ? n : room;
-        if (now == 0) {
-            if ((status = writer_flush(writer)) != GROOM_OK)
-                return status;
-            continue;
-        }
-        for (size_t i = 0; i < now; i++) {
-            float out[3];
-            writer_convert(writer, out, points[i]);
-            memcpy(writer->buffer + writer->used + i * sizeof out, out, sizeof out);
-        }
-        writer->used += now * sizeof *points;
+        size_t now = n < AT_ONCE ? n : AT_ONCE;
+        convert_packed(writer, converted, points, now);
+        groom_status status = writer_bytes(writer, converted, now * sizeof *points);
+        if (status != GROOM_OK)
+            return status;
         points += now;
         n -= now;
     }
@@ -164,7 +166,9 @@ groom_status groom_writer_create(const struct groom_write_options *options, uint
     writer->sink = sink;
     writer->context = context;
     writer->unit_m = unit_m;
+    writer->per_metre = 1 / unit_m;
     writer->width = width_m / unit_m;
+    writer->is_plain = unit_m == 1 && options->frame.up == GROOM_UP_Y;
     writer->up = options->frame.up;
     writer->n_strands = n_strands;
     writer->uniform_count = uniform_count;

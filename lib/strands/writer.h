@@ -25,8 +25,10 @@ struct groom_writer {
     const struct writer_format *format;
     struct groom_sink sink;
     const struct groom_context *context;
-    double unit_m, width; /* the width in the file's unit */
+    double unit_m, per_metre; /* metres in a unit of the file, and the reverse */
+    double width;             /* in the file's unit */
     groom_up up;
+    int is_plain;             /* metres and y up: nothing to convert */
     uint32_t n_strands, uniform_count;
     const uint32_t *vertex_counts; /* [n_strands] or NULL */
     uint64_t n_vertices, n_written;
@@ -47,7 +49,14 @@ GROOM_MUST_CHECK groom_status writer_text(struct groom_writer *writer, const cha
 GROOM_MUST_CHECK groom_status writer_flush(struct groom_writer *writer);
 
 /* The point as the file says it. */
-void writer_convert(const struct groom_writer *writer, float out[3], const float in[3]);
+static inline void writer_convert(const struct groom_writer *writer, float out[3], const float in[3])
+{
+    int z_up = writer->up == GROOM_UP_Z;
+    float y = z_up ? -in[2] : in[1], z = z_up ? in[1] : in[2];
+    out[0] = writer->is_plain ? in[0] : (float)(in[0] * writer->per_metre);
+    out[1] = writer->is_plain ? y : (float)(y * writer->per_metre);
+    out[2] = writer->is_plain ? z : (float)(z * writer->per_metre);
+}
 /* Points as three little-endian floats each. */
 GROOM_MUST_CHECK groom_status writer_points_f32(struct groom_writer *writer, const float (*points)[3], size_t n);
 /* "a SEPARATOR b SEPARATOR c" into out; 0 where a value is not finite. */

@@ -65,15 +65,16 @@ START_TEST(scan_gives_back_every_float_that_print_wrote)
         uint32_t bits[4];
         groom_random_block(key, i, 0, bits);
         for (int k = 0; k < 4; k++) {
-            char text[NUMBER_MAX + 1];
+            char text[NUMBER_MAX + 1 + NUMBER_PADDING];
             double value;
             float expected = float_of(bits[k]);
             if (!isfinite(expected))
                 continue;
             text[number_print(text, expected)] = 0;
             const unsigned char *end = number_scan((const unsigned char *)text, &value);
+            double padded;
             float back = (float)value;
-            if (end != (const unsigned char *)text + strlen(text) || memcmp(&back, &expected, sizeof back) != 0)
+            if (number_scan_padded((const unsigned char *)text, &padded) != end || padded != value || end != (const unsigned char *)text + strlen(text) || memcmp(&back, &expected, sizeof back) != 0)
                 ck_abort_msg("%s is read as %a, not %a", text, (double)back, (double)expected);
         }
     }
@@ -93,8 +94,9 @@ START_TEST(scan_is_near_strtod_for_doubles)
         if (!isfinite(expected) || fabs(expected) < 1e-290)
             continue;
         snprintf(text, sizeof text, words[2] & 1 ? "%.17g" : "%.25e", expected);
+        double padded;
         if (!number_scan((const unsigned char *)text, &value) ||
-            fabs(value - expected) > nextafter(fabs(expected), INFINITY) - fabs(expected))
+            number_scan_padded((const unsigned char *)text, &padded) == NULL || padded != value || fabs(value - expected) > nextafter(fabs(expected), INFINITY) - fabs(expected))
             ck_abort_msg("%s is read as %.17g", text, value);
     }
 }
