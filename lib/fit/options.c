@@ -1,0 +1,132 @@
+/* Every option of a fit, once: the path in JSON, where it is kept, its defaults, its range and what
+ * it does. The numbers are those of Chang et al. 2025, Section 6, where the paper gives them. */
+#include "fit/options.h"
+
+#include <string.h>
+
+#define AT(member) offsetof(struct groom_fit_options, member)
+#define ALL(x) {x, x, x}
+
+const struct option_row options_table[] = {
+    {"/vertices", OPTION_U32, AT(vertices), ALL(100), 3, 1000,
+     "Vertices of each strand and guide; the capture is resampled to it."},
+    {"/guides", OPTION_U32_OR_AUTO, AT(guides), ALL(0), 1, 10000,
+     "Guide strands. auto: 4 for each square root of the number of strands, at least 4 strands a guide."},
+    {"/operator_guides", OPTION_U32_OR_AUTO, AT(operator_guides), ALL(0), 1, 10000,
+     "Guides that operators work around, chosen among the guides. auto: a quarter of them."},
+    {"/operators", OPTION_OPERATORS, AT(operators), ALL(0), 0, GROOM_FIT_MAX_OPERATORS,
+     "The chain of operators, first to last. auto: scale, bend, curl, clump, frizz."},
+    {"/interpolation_guides", OPTION_U32, AT(interpolation_guides), ALL(3), 1, 16,
+     "Guides that each strand blends."},
+    {"/seed", OPTION_U64, AT(seed), ALL(1), 0, 9007199254740991.0,
+     "Seed of every random number of the fit and of the groom."},
+    {"/quality", OPTION_QUALITY, AT(quality), {0, 1, 2}, 0, 2,
+     "How much work to spend: sets the defaults of the stages."},
+    {"/visibility", OPTION_GROUP_OR_NULL, 0, ALL(0), 0, 0,
+     "What the capture was seen by: strands that no camera sees leave the losses of the stages."},
+    {"/visibility/cameras", OPTION_CAMERAS, AT(cameras), ALL(0), 0, GROOM_FIT_MAX_CAMERAS,
+     "Pinhole cameras: pixels and metres, world to camera, x right, y down, z forward."},
+    {"/stages", OPTION_GROUP, 0, ALL(0), 0, 0, "The hyperparameters of each stage."},
+
+#define ROW(stage, member, type, draft, standard, high, minimum, maximum, help)                              \
+    {"/stages/" #stage "/" #member, type, AT(stages.stage.member), {draft, standard, high}, minimum, maximum, help}
+
+    {"/stages/initialize", OPTION_GROUP, 0, ALL(0), 0, 0,
+     "Clustering, smoothing, operator guides, assignment (Section 5.2)."},
+    ROW(initialize, lambda_smooth, OPTION_REAL, 1, 1, 1, 0, 1e6, "Step of the heat equation that smooths guides (Eq. 6)."),
+    ROW(initialize, n_smooth, OPTION_U32, 80, 80, 80, 0, 100000, "Steps of the heat equation."),
+    ROW(initialize, fixed_fraction, OPTION_REAL, 0.05, 0.05, 0.05, 0, 1,
+        "Fraction of a guide's vertices at the root that smoothing leaves alone."),
+    ROW(initialize, cluster_iterations, OPTION_U32, 5, 12, 30, 1, 1000,
+        "Iterations of K-means at most; it stops where no strand changes its cluster."),
+    ROW(initialize, medoid_iterations, OPTION_U32, 2, 8, 30, 0, 1000,
+        "Passes of swaps of K-medoids at most; it stops where no swap is an improvement."),
+    ROW(initialize, sigma_instance, OPTION_REAL_OR_AUTO, 0, 0, 0, 1e-6, 10,
+        "Width of the instancing weights in scalp coordinates (Eq. 3). auto: 1.5 times the median spacing of guides."),
+    ROW(initialize, head_clearance, OPTION_REAL, 0.002, 0.002, 0.002, 0, 0.1,
+        "Metres inside the head that do not count as a penetration; for a head of ordinary size, scaled with it."),
+    ROW(initialize, estimate_operators, OPTION_BOOLEAN, 1, 1, 1, 0, 1,
+        "Start operators from estimates off the strands; else from their documented initial values."),
+
+    {"/stages/instance_weights", OPTION_GROUP, 0, ALL(0), 0, 0, "Instancing weights of each strand (Section 5.3)."},
+    ROW(instance_weights, iterations, OPTION_U32, 2000, 2000, 2000, 0, 1000000, "Gradient steps of the paper's method."),
+    ROW(instance_weights, learning_rate, OPTION_REAL, 30, 30, 30, 0, 1e6, "Learning rate of the paper's method."),
+
+    {"/stages/guides", OPTION_GROUP, 0, ALL(0), 0, 0, "The shape of the guides (Section 5.4)."},
+    ROW(guides, iterations, OPTION_U32, 3000, 3000, 3000, 0, 1000000, "Gradient steps."),
+    ROW(guides, learning_rate_curvature, OPTION_REAL, 5e-2, 5e-2, 5e-2, 0, 1e3, "Learning rate of curvatures."),
+    ROW(guides, learning_rate_length, OPTION_REAL, 1.5e-3, 1.5e-3, 1.5e-3, 0, 1e3, "Learning rate of segment lengths."),
+    ROW(guides, learning_rate_angle, OPTION_REAL, 5e-2, 5e-2, 5e-2, 0, 1e3, "Learning rate of root angles."),
+    ROW(guides, lambda, OPTION_REAL, 10, 10, 10, 0, 1e6, "Strength of the gradient filter across guides."),
+    ROW(guides, sigma_d, OPTION_REAL, 0.3, 0.3, 0.3, 1e-6, 1e3, "Width of the gradient filter in root direction."),
+    ROW(guides, sigma_phi, OPTION_REAL, 0.4, 0.4, 0.4, 1e-6, 1e3, "Width of the splat onto sphere directions."),
+
+    {"/stages/operators", OPTION_GROUP, 0, ALL(0), 0, 0, "The parameters of the operators (Section 5.5)."},
+    ROW(operators, iterations, OPTION_U32, 3000, 3000, 3000, 0, 1000000, "Gradient steps on each of the three losses."),
+    ROW(operators, alternate, OPTION_U32, 200, 200, 200, 1, 1000000, "Steps on one loss before the next one's turn."),
+    ROW(operators, learning_rate, OPTION_REAL, 1e-2, 1e-2, 1e-2, 0, 1e3, "Learning rate."),
+    ROW(operators, lambda_e, OPTION_REAL, 400, 400, 400, 0, 1e9, "Weight of the segment loss (Eq. 12)."),
+    ROW(operators, sigma_scale, OPTION_REAL, 0.1, 0.1, 0.1, 1e-6, 1e3, "Width of the kernel of lengths (Eq. 14)."),
+    ROW(operators, sigma_clump, OPTION_REAL, 0.1, 0.1, 0.1, 1e-6, 1e3, "Width of the kernel of distances (Eq. 16)."),
+    ROW(operators, batch_fraction, OPTION_REAL, 0.01, 0.01, 0.01, 1e-6, 1, "Fraction of strands in a kernel."),
+    ROW(operators, batch_maximum, OPTION_U32, 200, 200, 200, 2, 10000, "Strands in a kernel at most."),
+    ROW(operators, batches, OPTION_U32, 5, 5, 5, 1, 10000, "Kernels in a step."),
+    ROW(operators, batches_late, OPTION_U32, 50, 50, 50, 1, 10000, "Kernels in a step, in the last quarter."),
+
+    {"/stages/randoms", OPTION_GROUP, 0, ALL(0), 0, 0, "The random numbers of each strand (Section 5.6)."},
+    ROW(randoms, iterations, OPTION_U32, 3000, 3000, 3000, 0, 1000000, "Gradient steps."),
+    ROW(randoms, learning_rate, OPTION_REAL, 0.1, 0.1, 0.1, 0, 1e3, "Learning rate."),
+    ROW(randoms, lambda_d, OPTION_REAL, 2, 2, 2, 0, 1e9, "Weight of the direction loss (Eq. 19)."),
+    ROW(randoms, lambda_l, OPTION_REAL, 1e-2, 1e-2, 1e-2, 0, 1e9, "Weight of the length loss (Eq. 19)."),
+    ROW(randoms, noise_first, OPTION_REAL, 1.5, 1.5, 1.5, 0, 1e3, "Noise on the gradient in the first step (Eq. 21)."),
+    ROW(randoms, noise_last, OPTION_REAL, 0.5, 0.5, 0.5, 0, 1e3, "Noise on the gradient in the last step (Eq. 21)."),
+};
+
+const size_t options_n_rows = sizeof options_table / sizeof options_table[0];
+const char *const options_quality_names[3] = {"draft", "standard", "high"};
+
+const struct option_row *options_find(const char *path)
+{
+    for (size_t i = 0; i < options_n_rows; i++)
+        if (strcmp(options_table[i].path, path) == 0)
+            return &options_table[i];
+    return NULL;
+}
+
+const char *options_member(const char *path, const char *group)
+{
+    size_t n = strlen(group);
+    if (strncmp(path, group, n) != 0 || path[n] != '/')
+        return NULL;
+    return strchr(path + n + 1, '/') ? NULL : path + n + 1;
+}
+
+static void set_default(const struct option_row *row, double value, struct groom_fit_options *options)
+{
+    void *at = (char *)options + row->offset;
+    switch (row->type) {
+    case OPTION_U32:
+    case OPTION_U32_OR_AUTO: *(uint32_t *)at = (uint32_t)value; break;
+    case OPTION_U64: *(uint64_t *)at = (uint64_t)value; break;
+    case OPTION_REAL:
+    case OPTION_REAL_OR_AUTO: *(double *)at = value; break;
+    case OPTION_BOOLEAN: *(int *)at = value != 0; break;
+    case OPTION_QUALITY: *(groom_fit_quality *)at = (groom_fit_quality)value; break;
+    case OPTION_OPERATORS:
+        options->operators_auto = 1;
+        for (uint32_t i = 0; i < GROOM_OPERATOR_COUNT; i++)
+            options->operators[i] = (groom_operator_type)i;
+        options->n_operators = GROOM_OPERATOR_COUNT;
+        break;
+    case OPTION_CAMERAS: options->n_cameras = 0; break;
+    case OPTION_GROUP:
+    case OPTION_GROUP_OR_NULL: break;
+    }
+}
+
+void groom_fit_options_init(groom_fit_quality quality, struct groom_fit_options *options)
+{
+    memset(options, 0, sizeof *options);
+    for (size_t i = 0; i < options_n_rows; i++)
+        set_default(&options_table[i], options_table[i].initial[quality], options);
+}

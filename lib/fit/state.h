@@ -1,0 +1,76 @@
+/* What a fit holds, and what a stage is. */
+#ifndef FIT_STATE_H
+#define FIT_STATE_H
+
+#include <stdint.h>
+
+#include "groom/fit.h"
+#include "groom/scalp.h"
+#include "groom/spatial.h"
+
+struct groom_fit {
+    const struct groom_allocator *allocator;
+    struct groom_fit_options options;
+    uint64_t inputs; /* checksum of strands, head and options */
+
+    /* --- the target: a function of the inputs, made again by groom_fit_create ---------------- */
+    uint32_t n, m;
+    struct groom_bvh *bvh;     /* of the head; NULL without one */
+    struct groom_scalp *scalp; /* the chart of the roots */
+    float (*roots)[3];         /* [n] metres, on the scalp where the strand reaches it */
+    float (*root_uv)[2];       /* [n] */
+    float (*target)[3];        /* [n * m] (position - centre) / scale */
+    float centre[3];           /* of all points, metres */
+    float scale;               /* metres: root mean square distance of all points from the centre */
+    float ordinary;            /* size of this scalp over that of an ordinary one: 1 for real hair in metres */
+
+    /* --- what the stages have made so far: all of it is in a checkpoint ------------------------ */
+    uint32_t stage, phase, iteration; /* where the next step goes on; stage = count: done */
+    uint32_t n_guides;                /* 0 until clusters are seeded */
+    float (*centroids)[3];            /* [n_guides * m] of clusters, not smoothed, in the target's frame */
+    uint32_t *cluster_of;             /* [n] */
+    struct groom *groom;              /* NULL until there are guides */
+    struct groom_fit_report report;
+};
+
+struct fit_stage {
+    const char *name;
+    /* The next bounded piece of work. It moves phase and iteration on, and sets *ended with the last
+     * one. Where it fails, the fit stands as before. */
+    groom_status (*step)(struct groom_fit *fit, int *ended, const struct groom_context *context,
+                         struct groom_diag *diag);
+    double (*fraction)(const struct groom_fit *fit); /* 0..1 of the stage */
+    double weight;                                   /* its share of the time of a fit */
+};
+
+/* The stages of this library, in order: X(name, its share of the time of a fit). Each has a file
+ * <name>.c with <name>_step and <name>_fraction. A new stage is one line here and that file. */
+#define FIT_STAGE_LIST(X) X(initialize, 1.0)
+
+enum {
+#define FIT_STAGE_INDEX(name, weight) FIT_STAGE_##name,
+    FIT_STAGE_LIST(FIT_STAGE_INDEX)
+#undef FIT_STAGE_INDEX
+    FIT_N_STAGES
+};
+
+extern const struct fit_stage fit_stages[FIT_N_STAGES];
+int fit_has_stage(const char *name);
+
+/* stage `initialize` */
+groom_status initialize_step(struct groom_fit *fit, int *ended, const struct groom_context *context,
+                             struct groom_diag *diag);
+double initialize_fraction(const struct groom_fit *fit);
+/* Whether phase and iteration go with what else the state holds: for one that was read. */
+int initialize_sound(const struct groom_fit *fit);
+
+/* Fills n .. ordinary, and the report's counts of joined and detached strands. */
+groom_status target_create(struct groom_fit *fit, const struct groom_strands *strands,
+                           const struct groom_mesh *head, const struct groom_context *context,
+                           struct groom_diag *diag);
+
+/* report.c */
+void report_note(struct groom_fit_report *report, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void report_loss(struct groom_fit_report *report, const char *stage, const char *name, double before, double after);
+
+#endif
