@@ -89,6 +89,10 @@ $(PARTS_A): $(call objects,$(filter-out $(MAINS),$(DAEMON_SOURCES) $(WORKER_SOUR
 	@mkdir -p $(@D); rm -f $@
 	$(AR) rcs $@ $^
 
+# Files that are embedded (proto/embed.h).
+$(BUILD)/obj/server/http/about.o: proto/openapi.json
+$(BUILD)/obj/server/http/page.o: server/http/status.css
+
 $(BUILD)/groomd: $(call objects,server/groomd.c $(filter-out $(MAINS),$(DAEMON_SOURCES)))
 $(BUILD)/groom-worker: $(call objects,$(WORKER_SOURCES))
 $(BUILD)/groomctl: $(call objects,$(CLIENT_SOURCES))

@@ -1,0 +1,337 @@
+/* Uploads: strands and heads. Their bytes are a blob, what groom-worker found in them a row. */
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "groom/mesh.h"
+#include "proto/json_text.h"
+#include "server/blobs/blobs.h"
+#include "server/http/handlers.h"
+#include "server/http/tool.h"
+#include "server/store/store.h"
+
+/* What differs between the two. */
+struct kind {
+    enum store_asset_kind store;
+    const char *name;   /* of groom-worker inspect --kind */
+    const char *path;   /* of the collection */
+    const char *plural; /* the list's key */
+};
+static const struct kind strands = {STORE_STRANDS, "strands", "/v1/strands", "strands"};
+static const struct kind heads = {STORE_HEAD, "head", "/v1/heads", "heads"};
+
+/* --- as JSON ------------------------------------------------------------------------------- */
+
+/* Our own members first, then those of the inspection. */
+static cJSON *describe(const struct store_asset *asset)
+{
+    char created[32], up[2] = {asset->up, 0};
+    cJSON *object = cJSON_CreateObject(), *found = json_text_parse(asset->metadata, strlen(asset->metadata), NULL);
+    store_time_text(asset->created_ms, created);
+    bool fine = object && cJSON_AddStringToObject(object, "id", asset->id) &&
+                cJSON_AddStringToObject(object, "sha256", asset->sha256) &&
+                cJSON_AddNumberToObject(object, "bytes", (double)asset->n_bytes) &&
+                cJSON_AddStringToObject(object, "name", asset->name ? asset->name : "") &&
+                cJSON_AddStringToObject(object, "format", asset->format ? asset->format : "") &&
+                cJSON_AddNumberToObject(object, "unit_m", asset->unit_m) && cJSON_AddStringToObject(object, "up", up) &&
+                cJSON_AddStringToObject(object, "created_at", created);
+    for (cJSON *member = found ? found->child : NULL, *next; fine && member; member = next) {
+        next = member->next;
+        if (!cJSON_HasObjectItem(object, member->string))
+            cJSON_AddItemToObject(object, member->string, cJSON_DetachItemViaPointer(found, member));
+    }
+    cJSON_Delete(found);
+    if (fine)
+        return object;
+    cJSON_Delete(object);
+    return NULL;
+}
+
+static void respond_asset(struct request *request, const struct kind *kind, int status, const struct store_asset *asset)
+{
+    respond_json(request, status, describe(asset));
+    respond_header(request, "Location", "%s/%s", kind->path, asset->id);
+    respond_etag(request, "%s", asset->id);
+}
+
+/* --- upload -------------------------------------------------------------------------------- */
+
+/* How the bytes are to be read. */
+struct reading {
+    const char *format; /* "" where they are to say */
+    struct groom_frame frame;
+};
+
+static bool parse_reading(struct request *request, const struct kind *kind, struct reading *reading)
+{
+    groom_format format = GROOM_FORMAT_AUTO;
+    groom_mesh_format mesh = GROOM_MESH_AUTO;
+    struct groom_diag diag = {0};
+    const char *text = request_query(request, "format"), *name = request_query(request, "name");
+    *reading = (struct reading){"", {.unit_m = 1}};
+    if (name && strlen(name) >= 128) {
+        respond_bad_query(request, "name", "a name has at most 127 bytes");
+        return false;
+    }
+    if (kind->store == STORE_STRANDS && !tool_query_format(request, false, &format))
+        return false;
+    if (kind->store == STORE_HEAD && text && strcmp(text, "auto") && groom_mesh_format_parse(text, &mesh, &diag) != GROOM_OK) {
+        respond_bad_query(request, "format", "%s", diag.detail);
+        return false;
+    }
+    if (text && strcmp(text, "auto"))
+        reading->format = kind->store == STORE_HEAD ? groom_mesh_format_name(mesh) : groom_format_name(format);
+    return tool_query_frame(request, &reading->frame);
+}
+
+int assets_check_upload(struct request *request)
+{
+    struct reading reading;
+    if (request->n_expected == 0) {
+        respond_refusal(request, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL),
+                        "the body is empty; send the bytes of the file");
+        return 0;
+    }
+    return parse_reading(request, strstr(request->route->pattern, "heads") ? &heads : &strands, &reading);
+}
+
+static groom_status is_referenced(void *store, const char *sha256, bool *referenced)
+{
+    return store_blob_referenced(store, sha256, referenced, NULL);
+}
+
+static void forget_blob(struct request *request, const char *sha256)
+{
+    bool removed;
+    blobs_unpin(request->service->blobs, sha256);
+    /* where this fails the blob is garbage, which a later collection takes */
+    if (blobs_collect(request->service->blobs, sha256, is_referenced, request->service->store, &removed, NULL) != GROOM_OK)
+        return;
+}
+
+/* groom-worker's answer about the blob; NULL where it was refused (and answered). */
+static char *inspect(struct request *request, const struct kind *kind, const struct reading *reading, const char *sha256)
+{
+    int fd;
+    uint64_t n_bytes;
+    size_t n_output = 0;
+    char unit[40], *output = NULL;
+    struct groom_diag diag = {0};
+    snprintf(unit, sizeof unit, "%.17g", reading->frame.unit_m);
+    const char *const arguments[] = {"inspect", "--kind", kind->name, "--format", reading->format[0] ? reading->format : "auto",
+                                     "--unit", unit, "--up", reading->frame.up == GROOM_UP_Z ? "z" : "y", NULL};
+    groom_status status = blobs_read(request->service->blobs, sha256, &fd, &n_bytes, &diag);
+    if (status != GROOM_OK) {
+        respond_failure(request, status, &diag);
+        return NULL;
+    }
+    bool done = tool_run(request, arguments, fd, -1, &output, &n_output);
+    close(fd);
+    return done ? output : NULL;
+}
+
+static bool store_upload(struct request *request, const struct kind *kind, const struct reading *reading,
+                         struct store_asset *asset, char *metadata)
+{
+    bool created;
+    struct groom_diag diag = {0};
+    cJSON *found = json_text_parse(metadata, strlen(metadata), NULL);
+    const char *format = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(found, "format"));
+    const char *name = request_query(request, "name");
+    asset->format = strdup(format ? format : reading->format);
+    asset->name = strdup(name ? name : "");
+    asset->metadata = metadata;
+    cJSON_Delete(found);
+    asset->created_ms = store_now_ms();
+    groom_status status = asset->format && asset->name ? store_asset_put(request->service->store, asset, &created, &diag) : GROOM_ENOMEM;
+    if (status == GROOM_OK)
+        respond_asset(request, kind, created ? 201 : 200, asset);
+    else
+        respond_failure(request, status, &diag);
+    return status == GROOM_OK;
+}
+
+/* The blob is there: find its row, or make it. */
+static void take_upload(struct request *request, const struct kind *kind, const struct reading *reading, const char *sha256, uint64_t n_bytes)
+{
+    struct store_asset asset = {.kind = kind->store, .n_bytes = n_bytes, .unit_m = reading->frame.unit_m,
+                                .up = reading->frame.up == GROOM_UP_Z ? 'z' : 'y'}, known = {0};
+    char *metadata;
+    bool kept = false;
+    memcpy(asset.sha256, sha256, sizeof asset.sha256);
+    store_asset_id(kind->store, sha256, reading->format, asset.unit_m, asset.up, asset.id);
+    if (store_asset_get(request->service->store, kind->store, asset.id, &known, NULL) == GROOM_OK) {
+        respond_asset(request, kind, 200, &known);
+        store_asset_finish(&known);
+        kept = true;
+    } else if ((metadata = inspect(request, kind, reading, sha256))) {
+        kept = store_upload(request, kind, reading, &asset, metadata);
+        store_asset_finish(&asset);
+    }
+    if (kept)
+        blobs_unpin(request->service->blobs, sha256);
+    else
+        forget_blob(request, sha256);
+}
+
+static void post(struct request *request, const struct kind *kind)
+{
+    struct reading reading;
+    struct groom_diag diag = {0};
+    char sha256[BLOBS_HASH_SIZE];
+    if (!parse_reading(request, kind, &reading))
+        return;
+    if (request->n_received == 0) {
+        respond_refusal(request, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL),
+                        "the body is empty; send the bytes of the file");
+        return;
+    }
+    struct blobs_writer *writer = request->blob;
+    request->blob = NULL;
+    groom_status status = blobs_commit(writer, NULL, sha256, &diag);
+    if (status != GROOM_OK)
+        respond_failure(request, status, &diag);
+    else
+        take_upload(request, kind, &reading, sha256, request->n_received);
+}
+
+/* --- reading ---------------------------------------------------------------------------------- */
+
+static bool find(struct request *request, const struct kind *kind, struct store_asset *asset)
+{
+    struct groom_diag diag = {0};
+    groom_status status = store_asset_get(request->service->store, kind->store, request->parameter[0], asset, &diag);
+    if (status != GROOM_OK)
+        respond_failure(request, status, &diag);
+    return status == GROOM_OK;
+}
+
+static void get(struct request *request, const struct kind *kind)
+{
+    struct store_asset asset = {0};
+    if (!find(request, kind, &asset))
+        return;
+    if (!request_not_modified(request, asset.id))
+        respond_asset(request, kind, 200, &asset);
+    store_asset_finish(&asset);
+}
+
+static void list(struct request *request, const struct kind *kind)
+{
+    struct store_page page;
+    struct store_asset_list found = {0};
+    struct groom_diag diag = {0};
+    if (!request_page(request, &page))
+        return;
+    groom_status status = store_assets_list(request->service->store, kind->store, page, &found, &diag);
+    if (status != GROOM_OK) {
+        respond_failure(request, status, &diag);
+        return;
+    }
+    cJSON *object = cJSON_CreateObject(), *array = cJSON_AddArrayToObject(object, kind->plural);
+    for (size_t i = 0; i < found.n; i++)
+        cJSON_AddItemToArray(array, describe(&found.items[i]));
+    if (found.next)
+        cJSON_AddNumberToObject(object, "next", (double)found.next);
+    else
+        cJSON_AddNullToObject(object, "next");
+    store_asset_list_finish(&found);
+    respond_json(request, 200, object);
+}
+
+/* --- the bytes again ---------------------------------------------------------------------------- */
+
+static void respond_blob(struct request *request, const struct store_asset *asset, groom_format format)
+{
+    int fd;
+    uint64_t n_bytes;
+    struct groom_diag diag = {0};
+    groom_status status = blobs_read(request->service->blobs, asset->sha256, &fd, &n_bytes, &diag);
+    if (status != GROOM_OK) {
+        respond_failure(request, status, &diag);
+        return;
+    }
+    if (format != GROOM_FORMAT_AUTO) {
+        tool_respond_file(request, format, asset->id, asset->sha256, fd, n_bytes);
+        return;
+    }
+    respond_file(request, "application/octet-stream", fd, n_bytes);
+    respond_header(request, "Content-Disposition", "attachment; filename=\"%s.%s\"", asset->id, asset->format);
+    respond_etag(request, "%s", asset->sha256);
+}
+
+static void convert(struct request *request, const struct store_asset *asset, groom_format format, struct groom_frame frame, const char *etag)
+{
+    int from, to = -1;
+    uint64_t n_bytes;
+    char from_unit[40], unit[40], from_up[2] = {asset->up, 0};
+    struct groom_diag diag = {0};
+    snprintf(from_unit, sizeof from_unit, "%.17g", asset->unit_m);
+    snprintf(unit, sizeof unit, "%.17g", frame.unit_m);
+    const char *const arguments[] = {"convert", "--from-format", asset->format, "--from-unit", from_unit, "--from-up", from_up,
+                                     "--to-format", groom_format_name(format), "--unit", unit, "--up", frame.up == GROOM_UP_Z ? "z" : "y", NULL};
+    groom_status status = blobs_read(request->service->blobs, asset->sha256, &from, &n_bytes, &diag);
+    if (status != GROOM_OK) {
+        respond_failure(request, status, &diag);
+        return;
+    }
+    if ((to = tool_temporary(request)) >= 0 && tool_run(request, arguments, from, to, NULL, NULL)) {
+        tool_respond_file(request, format, asset->id, etag, to, (uint64_t)lseek(to, 0, SEEK_END));
+        to = -1;
+    }
+    close(from);
+    if (to >= 0)
+        close(to);
+}
+
+/* Metres and y up where nothing else is asked for; the very bytes where that is what they are. */
+static void strands_data(struct request *request, const struct store_asset *asset)
+{
+    struct groom_frame frame = {.unit_m = 1};
+    groom_format own = GROOM_FORMAT_AUTO, format;
+    char etag[80];
+    if (groom_format_parse(asset->format, &own, NULL) != GROOM_OK)
+        own = GROOM_FORMAT_AUTO;
+    format = groom_format_writable(own) ? own : GROOM_FORMAT_HAIR;
+    if (!tool_query_format(request, true, &format) || !tool_query_frame(request, &frame))
+        return;
+    bool same_up = (asset->up == 'z') == (frame.up == GROOM_UP_Z);
+    bool same_unit = !(frame.unit_m < asset->unit_m) && !(frame.unit_m > asset->unit_m);
+    if (format == own && same_up && same_unit) {
+        if (!request_not_modified(request, asset->sha256))
+            respond_blob(request, asset, format);
+        return;
+    }
+    snprintf(etag, sizeof etag, "%s-%s-%.9g-%s", asset->id, groom_format_name(format), frame.unit_m, frame.up == GROOM_UP_Z ? "z" : "y");
+    if (!request_not_modified(request, etag))
+        convert(request, asset, format, frame, etag);
+}
+
+void assets_get_strands_data(struct request *request)
+{
+    struct store_asset asset = {0};
+    if (!find(request, &strands, &asset))
+        return;
+    strands_data(request, &asset);
+    store_asset_finish(&asset);
+}
+
+/* A head as it was uploaded. */
+void assets_get_head_data(struct request *request)
+{
+    struct store_asset asset = {0};
+    if (!find(request, &heads, &asset))
+        return;
+    if (!request_not_modified(request, asset.sha256))
+        respond_blob(request, &asset, GROOM_FORMAT_AUTO);
+    store_asset_finish(&asset);
+}
+
+void assets_post_strands(struct request *request) { post(request, &strands); }
+void assets_post_head(struct request *request) { post(request, &heads); }
+void assets_list_strands(struct request *request) { list(request, &strands); }
+void assets_list_heads(struct request *request) { list(request, &heads); }
+void assets_get_strands(struct request *request) { get(request, &strands); }
+void assets_get_head(struct request *request) { get(request, &heads); }

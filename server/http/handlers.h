@@ -1,0 +1,64 @@
+/* The handlers, by resource, and the table that names them (routes.c). */
+#ifndef HTTP_HANDLERS_H
+#define HTTP_HANDLERS_H
+
+#include "server/http/request.h"
+
+extern const struct route http_routes[];
+extern const size_t http_n_routes;
+
+/* about.c: the service itself */
+void about_health(struct request *request);
+void about_ready(struct request *request);
+void about_metrics(struct request *request);
+void about_options(struct request *request);
+void about_openapi(struct request *request);
+
+/* page.c: the status page */
+void page_index(struct request *request);
+void page_style(struct request *request);
+
+/* assets.c: uploads */
+int assets_check_upload(struct request *request);
+void assets_post_strands(struct request *request);
+void assets_list_strands(struct request *request);
+void assets_get_strands(struct request *request);
+void assets_get_strands_data(struct request *request);
+void assets_post_head(struct request *request);
+void assets_list_heads(struct request *request);
+void assets_get_head(struct request *request);
+void assets_get_head_data(struct request *request);
+
+/* job_calls.c */
+void jobs_call_post(struct request *request);
+void jobs_call_list(struct request *request);
+void jobs_call_get(struct request *request);
+void jobs_call_delete(struct request *request);
+void jobs_call_events(struct request *request);
+void jobs_call_losses(struct request *request);
+
+/* work_calls.c: what an attempt asks and tells */
+void work_call_job(struct request *request);
+void work_call_blob(struct request *request);
+void work_call_progress(struct request *request);
+int work_check_stage(struct request *request);
+void work_call_checkpoint(struct request *request);
+void work_call_result(struct request *request);
+void work_call_failed(struct request *request);
+
+/* groom_calls.c */
+void grooms_call_list(struct request *request);
+void grooms_call_import(struct request *request);
+void grooms_call_get(struct request *request);
+int grooms_check_patch(struct request *request);
+void grooms_call_patch(struct request *request);
+void grooms_call_strands(struct request *request);
+void grooms_call_guides(struct request *request);
+int grooms_check_guides(struct request *request);
+void grooms_call_put_guides(struct request *request);
+void grooms_call_revisions(struct request *request);
+int grooms_check_edit(struct request *request);
+void grooms_call_revert(struct request *request);
+void grooms_call_preview(struct request *request);
+
+#endif

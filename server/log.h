@@ -1,0 +1,22 @@
+/* One line of JSON on standard error for what is worth knowing:
+ *     {"time":"2026-01-31T12:00:00.250Z","level":"info","message":"...", members}
+ * threads   any; a line is written in one piece */
+#ifndef SERVER_LOG_H
+#define SERVER_LOG_H
+
+#include <stddef.h>
+
+#include "server/config.h"
+
+void log_set_level(enum config_log_level level);
+int log_wants(enum config_log_level level);
+
+/* A message with no members. */
+void log_message(enum config_log_level level, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* The same with members, which are JSON already: "\"job\":\"job_…\",\"attempt\":2". */
+void log_members(enum config_log_level level, const char *message, const char *members);
+
+/* text as the inside of a JSON string, cut where it does not fit; returns `out`. */
+const char *log_escape(const char *text, char *out, size_t capacity);
+
+#endif
