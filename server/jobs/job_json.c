@@ -83,20 +83,6 @@ cJSON *jobs_json(const struct store_job *job)
     return object;
 }
 
-cJSON *jobs_problem(const struct groom_diag *diag)
-{
-    cJSON *problem = cJSON_CreateObject();
-    if (!problem)
-        return NULL;
-    cJSON_AddStringToObject(problem, "type", groom_status_name(diag->status));
-    cJSON_AddStringToObject(problem, "title", groom_status_message(diag->status));
-    cJSON_AddNumberToObject(problem, "status", groom_status_http(diag->status));
-    cJSON_AddStringToObject(problem, "detail", diag->detail);
-    if (diag->pointer[0])
-        cJSON_AddStringToObject(problem, "pointer", diag->pointer);
-    return problem;
-}
-
 static void add_loss(cJSON *stages, const struct store_loss_row *loss)
 {
     cJSON *curve = cJSON_GetObjectItemCaseSensitive(stages, loss->stage);

@@ -73,7 +73,5 @@ struct cJSON *jobs_json(const struct store_job *job);
 /* {"<stage>":[{"iteration","name","value"},…],…} of GET /v1/jobs/{id}/losses; malloc'ed text. */
 GROOM_MUST_CHECK groom_status jobs_losses_json(struct jobs *jobs, const char *id, char **text,
                                                struct groom_diag *diag);
-/* A problem object {"type","title","status","detail"[,"pointer"]}: a job's error. NULL: out of memory. */
-struct cJSON *jobs_problem(const struct groom_diag *diag);
 
 #endif

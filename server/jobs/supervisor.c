@@ -13,6 +13,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "proto/problem.h"
 #include "server/jobs/queue.h"
 #include "server/jobs/work.h"
 
@@ -131,20 +132,18 @@ static cJSON *describe_attempts(struct supervisor *s, const char *job_id)
 /* The error of a job that too many attempts have died of. Text of cJSON's, or NULL. */
 static char *describe_death(struct supervisor *s, const struct store_job *job, const char *words)
 {
-    char detail[256];
-    cJSON *problem = cJSON_CreateObject(), *attempts = describe_attempts(s, job->id);
+    struct problem problem;
+    cJSON *attempts = describe_attempts(s, job->id);
     cJSON *last = cJSON_GetArrayItem(attempts, cJSON_GetArraySize(attempts) - 1);
     if (last)
         cJSON_ReplaceItemInObjectCaseSensitive(last, "last_words", cJSON_CreateString(words));
-    snprintf(detail, sizeof detail, "%u attempts died; the last one ended with %.*s", job->n_failures + 1,
-             (int)strcspn(words, "\n"), words);
-    cJSON_AddStringToObject(problem, "type", "worker-died");
-    cJSON_AddStringToObject(problem, "title", "the worker died again and again");
-    cJSON_AddNumberToObject(problem, "status", 500);
-    cJSON_AddStringToObject(problem, "detail", detail);
-    cJSON_AddItemToObject(problem, "attempts", attempts);
-    char *text = cJSON_PrintUnformatted(problem);
-    cJSON_Delete(problem);
+    problem_set(&problem, 500, "worker-died", "the worker died again and again",
+                "%u attempts died without getting further; the last one ended with %.*s", job->n_failures + 1,
+                (int)strcspn(words, "\n"), words);
+    cJSON *object = problem_to_json(&problem);
+    cJSON_AddItemToObject(object, "attempts", attempts);
+    char *text = cJSON_PrintUnformatted(object);
+    cJSON_Delete(object);
     return text;
 }
 

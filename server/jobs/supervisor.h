@@ -2,8 +2,9 @@
  *
  * It takes the next job, makes an attempt with a one-time token, launches a worker, and watches for
  * its end. A worker that ends without a result has died: the job is queued again after a back-off and
- * goes on from its last checkpoint, until too many attempts have died; then it has failed, with its
- * history and the worker's last words. A job that is to be cancelled: the worker hears it with its next
+ * goes on from its last checkpoint, until too many attempts in a row have died without a new one; then
+ * it has failed, with its history and the worker's last words (a problem "worker-died" with
+ * "attempts":[{"attempt","state","started_at","last_words"},…]). A job that is to be cancelled: the worker hears it with its next
  * report, gets SIGTERM after a second and SIGKILL after another.
  *
  * The thread that launches is the one that lives as long as the workers do: local workers are told by
@@ -18,7 +19,7 @@ struct supervisor;
 
 struct supervisor_options {
     uint32_t n_slots;               /* attempts at a time; 0: 1 */
-    uint32_t max_deaths;            /* of a job's attempts before it has failed; 0: 3 */
+    uint32_t max_deaths;            /* in a row, before a job has failed; 0: 3 */
     uint32_t backoff_ms;            /* after the first death, doubled with each; 0: 500 */
     uint32_t backoff_max_ms;        /* 0: 60 000 */
     uint32_t cancel_grace_ms;       /* until SIGTERM, and again until SIGKILL; 0: 1000 */

@@ -149,6 +149,13 @@ static groom_status read_checkpoint(struct store *store, const char *job_id, str
     return query_end(&q);
 }
 
+static groom_status forget_failures(struct store *store, const char *job_id, struct groom_diag *diag)
+{
+    struct query q = query_open(store, "UPDATE jobs SET n_failures = 0 WHERE id = ?1", diag);
+    query_text(&q, 1, job_id);
+    return query_run(&q, NULL);
+}
+
 static groom_status write_checkpoint(struct store *store, const struct store_attempt_ref *ref,
                                      const struct store_checkpoint *checkpoint, struct store_checkpoint *before,
                                      struct groom_diag *diag)
@@ -157,6 +164,8 @@ static groom_status write_checkpoint(struct store *store, const struct store_att
     groom_status status = pass_fence(store, ref, NULL, diag);
     if (status == GROOM_OK)
         status = read_checkpoint(store, ref->job_id, before, &found, diag);
+    if (status == GROOM_OK && strcmp(before->sha256, checkpoint->sha256) != 0)
+        status = forget_failures(store, ref->job_id, diag);
     if (status != GROOM_OK)
         return status;
     struct query q = query_open(store,

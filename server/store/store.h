@@ -200,7 +200,7 @@ struct store_job {
     double eta_s;           /* negative: unknown */
     char *loss;             /* JSON object: the last value of each loss */
     uint32_t attempt;       /* number of the last attempt begun; 0: none yet */
-    uint32_t n_failures;    /* attempts that died by themselves */
+    uint32_t n_failures;    /* attempts that died by themselves since the job last got further */
     bool cancel_requested;
     char *result, *error;   /* JSON objects or NULL */
     int64_t created_ms, started_ms, finished_ms;
@@ -327,7 +327,9 @@ struct store_checkpoint {
     uint32_t stage; /* stages that are done */
 };
 
-/* This blob is the job's checkpoint from now on; `replaced` is what it was before ("" for none).
+/* This blob is the job's checkpoint from now on; `replaced` is what it was before ("" for none). Where
+ * it is another than before the job has got further: its n_failures starts from 0 again, so that a long
+ * job on a bad machine ends, and one that dies again and again at the same place does not go on.
  * returns  GROOM_ECONFLICT (fenced) */
 GROOM_MUST_CHECK groom_status store_attempt_checkpoint(struct store *store, const struct store_attempt_ref *ref,
                                                        const struct store_checkpoint *checkpoint,

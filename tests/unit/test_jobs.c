@@ -574,6 +574,17 @@ START_TEST(a_worker_that_dies_is_followed_by_another_from_its_checkpoint)
     ck_ok(work_describe(jobs, &second, &text, &diag));
     ck_assert_ptr_nonnull(strstr(text, hash));
     free(text);
+    struct store_job job = get(id);
+    ck_assert_uint_eq(job.n_failures, 1);
+    store_job_finish(&job);
+    checkpoint(&second, "half", 1, hash); /* where it was: that is no progress */
+    job = get(id);
+    ck_assert_uint_eq(job.n_failures, 1);
+    store_job_finish(&job);
+    checkpoint(&second, "more", 2, hash);
+    job = get(id);
+    ck_assert_uint_eq(job.n_failures, 0);
+    store_job_finish(&job);
     ck_ok(succeed(&second, "grm_a"));
     struct store_attempt_list attempts;
     ck_ok(store_attempts_list(store, id, &attempts, &diag));
@@ -597,9 +608,9 @@ START_TEST(a_poison_job_fails_with_its_history_and_last_words)
     cJSON *error = cJSON_Parse(job.error);
     ck_assert_uint_eq(job.attempt, 3);
     ck_assert_uint_eq(job.n_failures, 3);
-    ck_assert_str_eq(cJSON_GetObjectItem(error, "type")->valuestring, "worker-died");
+    ck_assert_str_eq(cJSON_GetObjectItem(error, "type")->valuestring, "/problems/worker-died");
     ck_assert_str_eq(cJSON_GetObjectItem(error, "detail")->valuestring,
-                     "3 attempts died; the last one ended with exit status 7");
+                     "3 attempts died without getting further; the last one ended with exit status 7");
     cJSON *attempts = cJSON_GetObjectItem(error, "attempts");
     ck_assert_int_eq(cJSON_GetArraySize(attempts), 3);
     for (int i = 0; i < 3; i++) {

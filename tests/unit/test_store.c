@@ -1,9 +1,12 @@
 /* The store: rows come back as they went in, transactions are whole, the fence holds. */
 #include <pthread.h>
+#include <signal.h>
 #include <sqlite3.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "server/store/database.h"
 #include "tests/support/folder.h"
@@ -717,6 +720,54 @@ START_TEST(no_job_is_taken_twice)
 }
 END_TEST
 
+/* --- a killed process --------------------------------------------------------------------------------- */
+
+/* Makes jobs and says each that the store has acknowledged. */
+static void make_jobs_and_say(int fd)
+{
+    struct store *store;
+    if (store_open(test_folder_path("groomd.db"), &store, NULL) != GROOM_OK)
+        _exit(1);
+    for (;;) {
+        char id[STORE_ID_SIZE] = "", made[STORE_ID_SIZE];
+        bool created;
+        struct store_job_new job = {.id = id, .kind = "fit", .request = "{}", .options = "{}"};
+        if (store_make_id("job_", id) != GROOM_OK || store_job_create(store, &job, made, &created, NULL) != GROOM_OK ||
+            write(fd, id, sizeof id) != (ssize_t)sizeof id)
+            _exit(1);
+    }
+}
+
+START_TEST(what_was_acknowledged_survives_a_kill)
+{
+    struct store *store = open_new();
+    char id[STORE_ID_SIZE];
+    store_close(store);
+    for (int round = 0; round < 8; round++) {
+        int ends[2], n_said = 0;
+        ck_assert_int_eq(pipe(ends), 0);
+        pid_t child = fork();
+        if (child == 0)
+            make_jobs_and_say(ends[1]);
+        close(ends[1]);
+        while (n_said < 3 + 5 * round && read(ends[0], id, sizeof id) == (ssize_t)sizeof id)
+            n_said++;
+        kill(child, SIGKILL);
+        waitpid(child, NULL, 0);
+        ck_assert_int_ge(n_said, 3);
+        ck_ok(store_open(test_folder_path("groomd.db"), &store, &diag));
+        do { /* the last one read, and all that were said after it */
+            struct store_job job;
+            ck_ok(store_job_get(store, id, &job, &diag));
+            store_job_finish(&job);
+        } while (read(ends[0], id, sizeof id) == (ssize_t)sizeof id);
+        store_close(store);
+        close(ends[0]);
+    }
+    test_folder_remove();
+}
+END_TEST
+
 /* --- a full disk -------------------------------------------------------------------------------------- */
 
 START_TEST(a_full_database_says_so_and_goes_on)
@@ -748,4 +799,5 @@ TEST_SUITE("store", a_newer_schema_is_refused, what_is_not_a_database_is_refused
            a_back_off_holds_a_job_back, a_checkpoint_replaces_the_one_before_and_goes_with_the_job,
            events_are_numbered_without_gaps, a_loss_that_is_reported_again_is_kept_once,
            progress_leaves_alone_what_it_does_not_name, no_job_is_taken_twice,
+           what_was_acknowledged_survives_a_kill,
            a_full_database_says_so_and_goes_on)
