@@ -231,25 +231,31 @@ GROOM_MUST_CHECK groom_status groom_select(const struct groom *groom, const uint
 
 /* --- curvature parameters of guides (Eq. 10; Crane et al. 2013) ------------- */
 
-/* Per guide: root position, root angles (2), m-1 segment lengths, m-2 curvatures of each of the
- * two angles. The azimuth is unwrapped along the strand; the pole of the spherical coordinates is
- * chosen per guide away from its directions, and stored. */
+/* Per guide: root position, root angles (2), m-1 segment lengths, m-2 curvatures of each of the two
+ * angles. With phi = (polar, azimuth) and segments and joints counted from 0,
+ *   phi_0 = angle, phi_{j+1} = phi_j + (length_j + length_{j+1}) / 2 curvature_j,
+ *   d_j = pole^T (sin polar cos azimuth, sin polar sin azimuth, cos polar), x_{j+1} = x_j + length_j d_j.
+ * The azimuth is unwrapped along the strand; the pole (the last row of the rotation) is chosen per
+ * guide as far from its directions as 128 candidates allow, and stays until from_points is called again. */
 struct groom_curvature_guides {
     uint32_t n_guides, n_vertices;
-    float (*root)[3];      /* [n_g] */
+    float (*root)[3];      /* [n_g] metres */
     float (*pole)[9];      /* [n_g] rotation (row-major) into the guide's own spherical frame */
-    float (*angle)[2];     /* [n_g] (polar, azimuth) of the first segment */
+    float (*angle)[2];     /* [n_g] (polar, azimuth) of the first segment, radians */
     float *length;         /* [n_g][m-1] metres */
     float (*curvature)[2]; /* [n_g][m-2] radians per metre */
     const struct groom_allocator *allocator;
 };
 
+/* Zeroed. Owned by the caller.
+ * returns  GROOM_OK, GROOM_EINVAL (no guide, fewer than 3 vertices), GROOM_ENOMEM */
 GROOM_MUST_CHECK groom_status groom_curvature_guides_create(uint32_t n_guides, uint32_t n_vertices,
                                                             const struct groom_context *context,
                                                             struct groom_curvature_guides **guides,
                                                             struct groom_diag *diag);
 void groom_curvature_guides_destroy(struct groom_curvature_guides *guides); /* takes NULL */
-/* points [n_g][m][3] -> parameters. Segments of no length get a length floor and the neighbour's direction. */
+/* points [n_g][m][3] -> parameters. Segments shorter than 1e-6 m get that length and the direction of
+ * the segment before them (at the root: of the first that has one). All three: same bits for any pool. */
 void groom_curvature_guides_from_points(const float (*points)[3], struct groom_curvature_guides *guides,
                                         const struct groom_context *context);
 /* parameters -> points [n_g][m][3] */
