@@ -443,6 +443,8 @@ static groom_status cut_uniformly(struct ply *ply)
 
 static groom_status read_rows(struct ply *ply, const struct element *element)
 {
+    if (ply->ascii)
+        text_end(&ply->text); /* what counts are checked against begins here */
     groom_status status = check_element(ply, element);
     if (status != GROOM_OK)
         return status;

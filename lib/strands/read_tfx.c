@@ -126,8 +126,12 @@ static groom_status expect_number(struct text *text, const char *what, double *v
 static groom_status expect_count(struct text *text, const char *what, long long *value, struct groom_diag *diag)
 {
     text_skip_space(text);
-    if (!text_integer(text, value) || *value < 0)
+    text_ready(text);
+    const unsigned char *begin = text->p;
+    if (!text_integer(text, value) || *value < 0) {
+        text->p = begin; /* the place to name */
         return text_fail(text, what, diag);
+    }
     return GROOM_OK;
 }
 

@@ -13,9 +13,10 @@
  *      a coordinate is no plausible number (finite, below 1e9, no denormal). The wrong stride
  *      lands in the middle of a float, whose bits make an impossible count. Where more than one is
  *      possible, the one with more whole records wins, then the smaller stride.
- *    Where nothing fits the size, the same is asked without it: a file that is cut off or has bytes
- *    too many goes to its reader, which says where it breaks. Without a size, counts above 2^24 strands
- *    or 2^20 vertices of one are taken for the bytes of something else.
+ *    Where nothing fits the size, the same is asked without it, and a layout is possible whose first
+ *    records are whole: a file that is cut off, has a wrong count or bytes too many goes to its
+ *    reader, which says where it breaks. Without a size, counts above 2^24 strands or 2^20 vertices
+ *    of one are taken for the bytes of something else.
  */
 #include "strands/recognise.h"
 
@@ -154,7 +155,8 @@ static int is_monohair(const struct bytes *bytes)
     return 1;
 }
 
-/* How many whole records the walk meets, 0 where the stride is impossible. */
+/* 1 more than the whole records that the walk meets, 0 where the stride is impossible; without a
+ * size, as many as it met where it breaks. */
 static uint64_t walk_records(const struct bytes *bytes, uint32_t stride)
 {
     uint64_t at = 4, n_whole = 0, n_strands, size = bytes->size >= 0 ? (uint64_t)bytes->size : UINT64_MAX;
@@ -167,10 +169,10 @@ static uint64_t walk_records(const struct bytes *bytes, uint32_t stride)
     for (uint64_t i = 0; i < n_strands && at + 4 <= bytes->n; i++) {
         uint64_t n = input_u32(bytes->at + at), end = at + 4 + n * stride;
         if (n > INT32_MAX / stride || end > size || (bytes->size < 0 && n > MANY_VERTICES))
-            return 0;
+            return bytes->size < 0 ? n_whole : 0;
         for (uint64_t j = 0; j < n && j < 16 && at + 4 + (j + 1) * stride <= bytes->n; j++)
             if (!plausible_point(bytes->at + at + 4 + j * stride))
-                return 0;
+                return bytes->size < 0 ? n_whole : 0;
         n_whole += end <= bytes->n;
         at = end;
         if (i + 1 == n_strands && bytes->size >= 0 && at != size)
