@@ -232,7 +232,34 @@ START_TEST(client_gives_up_when_interrupted)
 }
 END_TEST
 
+static void count_tick(void *user)
+{
+    ++*(int *)user;
+}
+
+START_TEST(client_lets_go_of_all_when_a_vital_one_ends)
+{
+    struct canned quick; /* serves one connection; the other waits to be accepted */
+    struct http_response responses[2];
+    http_outcome outcomes[2];
+    int ticks = 0;
+    canned_start(&quick, "HTTP/1.1 200 OK\r\nContent-Length: 1\r\nConnection: close\r\n\r\nx");
+    struct http_client *client = client_to(quick.url, NULL);
+    struct http_request requests[2] = {{.method = "GET", .path = "/x", .is_vital = 1},
+                                       {.method = "GET", .path = "/never", .is_vital = 1}};
+    http_perform_all(client, requests, 2, responses, outcomes, count_tick, &ticks);
+    ck_assert(outcomes[0] == HTTP_ANSWERED || outcomes[1] == HTTP_ANSWERED);
+    ck_assert(outcomes[0] == HTTP_INTERRUPTED || outcomes[1] == HTTP_INTERRUPTED);
+    ck_assert_int_ge(ticks, 1);
+    http_response_finish(&responses[0]);
+    http_response_finish(&responses[1]);
+    http_client_destroy(client);
+    canned_stop(&quick);
+}
+END_TEST
+
 TEST_SUITE("http_client", job_states_have_names_and_back, url_encodes_what_a_query_may_not_hold,
            url_says_when_it_does_not_fit, events_come_whole_whatever_the_pieces,
            events_survive_a_reconnect_and_a_flood, client_sends_the_request_and_reads_the_answer,
-           client_keeps_a_problem_out_of_the_sink, client_names_how_a_line_fails, client_gives_up_when_interrupted)
+           client_keeps_a_problem_out_of_the_sink, client_names_how_a_line_fails, client_gives_up_when_interrupted,
+           client_lets_go_of_all_when_a_vital_one_ends)
