@@ -94,7 +94,7 @@ int job_view_event(struct job_view *view, const char *event, const cJSON *data)
 
 static const char *note_of(const struct job_view *view, char note[64])
 {
-    if (view->state == JOB_STATE_RUNNING) return NULL;
+    if (view->state == JOB_STATE_RUNNING) return view->stage[0] ? NULL : "starting";
     if (view->state == JOB_STATE_QUEUED && view->queue_position > 0) {
         snprintf(note, 64, "queued, %d before it", view->queue_position);
         return note;
@@ -109,7 +109,7 @@ void job_view_line(const struct job_view *view, int with_id, char note[64], stru
                                    .stage_index = view->stage_index, .stage_count = view->stage_count,
                                    .fraction = view->state == JOB_STATE_SUCCEEDED ? 1 : view->progress,
                                    .loss_name = view->has_loss ? view->loss_name : NULL, .loss = view->loss,
-                                   .eta_s = view->state == JOB_STATE_RUNNING ? view->eta_s : -1, .note = note_of(view, note)};
+                                   .eta_s = view->state == JOB_STATE_RUNNING && view->progress < 1 ? view->eta_s : -1, .note = note_of(view, note)};
 }
 
 void job_view_print_end(const struct job_view *view)

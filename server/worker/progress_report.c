@@ -44,16 +44,17 @@ static void add_losses(cJSON *message, const struct progress_report *report)
     }
 }
 
+/* Before there is a fit nothing is said of progress: an earlier attempt may have come far. */
 char *progress_report_text(const struct progress_report *report, double now_s)
 {
     cJSON *message = cJSON_CreateObject();
-    struct groom_fit_progress progress = {.fraction = 0};
     if (report->fit) {
+        struct groom_fit_progress progress;
         groom_fit_progress(report->fit, &progress);
         add_stage(message, &progress);
+        cJSON_AddNumberToObject(message, "progress", progress.fraction);
         add_time_left(message, report, progress.fraction, now_s);
     }
-    cJSON_AddNumberToObject(message, "progress", progress.fraction);
     add_losses(message, report);
     char *text = cJSON_PrintUnformatted(message);
     cJSON_Delete(message);
