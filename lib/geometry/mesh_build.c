@@ -10,6 +10,8 @@
 
 /* Farther than this (metres) squares of distances would leave float. */
 #define FARTHEST_M 1e9f
+/* A texture coordinate beyond this is none. */
+#define FARTHEST_UV 1e6f
 
 void mesh_build_init(struct mesh_build *build, const struct groom_context *context)
 {
@@ -136,7 +138,7 @@ static int take_corners(struct cutter *cutter, const struct mesh_face *face, uin
             return 0;
         if (n && cutter->corner_vertex[n - 1] == c.vertex)
             continue;
-        if (c.uv != MESH_NO_UV && !(isfinite(uvs[c.uv][0]) && isfinite(uvs[c.uv][1])))
+        if (c.uv != MESH_NO_UV && !(fabsf(uvs[c.uv][0]) <= FARTHEST_UV && fabsf(uvs[c.uv][1]) <= FARTHEST_UV))
             c.uv = MESH_NO_UV;
         cutter->corner_vertex[n] = c.vertex;
         cutter->corner_uv[n++] = c.uv;

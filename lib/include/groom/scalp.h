@@ -33,9 +33,10 @@ struct groom_scalp;
  * head's texture coordinates are taken where they serve: they cover the roots, neighbours on the
  * scalp are neighbours in them and the other way round (no seam, no mirrored or stacked charts),
  * and their scale varies little. Where they do not, or there are none, the chart is the azimuthal
- * equidistant map of a sphere fitted to the roots (a plane where they fit none): the pole is in the
- * middle of the roots, u grows towards +x, v towards the back (-z) or, where the pole looks that
- * way, up. Either way it is moved and scaled, by one number, to fill [0,1]^2 centred.
+ * equidistant map of a sphere fitted to the roots (Snyder 1987, p. 191; a plane where they fit none):
+ * the pole is in the middle of the roots, v grows towards the back of the head (-z) or, where the
+ * pole looks to the front or back, upwards, and u to the right of v as seen from outside. Either
+ * way it is moved and scaled, by one number, to fill [0,1]^2 centred.
  *
  * roots    [n] metres; those that are not finite are left out of account
  * head     NULL: from the roots alone; borrowed until groom_scalp_destroy
