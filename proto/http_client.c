@@ -29,25 +29,23 @@ struct transfer {
     struct http_response *response;
     char *url;
     char error[CURL_ERROR_SIZE];
-    size_t capacity;  /* of response->body */
-    uint64_t at;      /* of the body sent */
-    int stopped;      /* the sink said so */
+    size_t capacity; /* of response->body */
+    uint64_t at;     /* of the body sent */
+    int stopped;     /* the sink said so */
     int done;
     CURLcode code;
 };
 
 /* --- the client ----------------------------------------------------------- */
 
-static void start_curl(void)
-{
-    curl_global_init(CURL_GLOBAL_DEFAULT);
-}
+static void start_curl(void) { curl_global_init(CURL_GLOBAL_DEFAULT); }
 
 static char *join(const char *a, const char *b)
 {
     size_t n = strlen(a), m = strlen(b);
     char *text = malloc(n + m + 1);
-    if (!text) return NULL;
+    if (!text)
+        return NULL;
     memcpy(text, a, n);
     memcpy(text + n, b, m + 1);
     return text;
@@ -57,7 +55,8 @@ struct http_client *http_client_create(const struct http_client_options *options
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     struct http_client *client = calloc(1, sizeof *client);
-    if (!client) return NULL;
+    if (!client)
+        return NULL;
     pthread_once(&once, start_curl);
     client->multi = curl_multi_init();
     client->base_url = join(options->base_url, "");
@@ -70,24 +69,24 @@ struct http_client *http_client_create(const struct http_client_options *options
         http_client_destroy(client);
         return NULL;
     }
-    for (size_t n = strlen(client->base_url); n && client->base_url[n - 1] == '/'; n--) client->base_url[n - 1] = '\0';
+    for (size_t n = strlen(client->base_url); n && client->base_url[n - 1] == '/'; n--)
+        client->base_url[n - 1] = '\0';
     return client;
 }
 
 void http_client_destroy(struct http_client *client)
 {
-    if (!client) return;
-    if (client->multi) curl_multi_cleanup(client->multi);
+    if (!client)
+        return;
+    if (client->multi)
+        curl_multi_cleanup(client->multi);
     free(client->base_url);
     free(client->authorization);
     free(client->agent);
     free(client);
 }
 
-const char *http_client_base_url(const struct http_client *client)
-{
-    return client->base_url;
-}
+const char *http_client_base_url(const struct http_client *client) { return client->base_url; }
 
 void http_response_finish(struct http_response *response)
 {
@@ -107,11 +106,13 @@ static size_t on_send(char *buffer, size_t size, size_t n, void *user)
         memcpy(buffer, (const char *)request->body + t->at, piece);
     } else if (piece) {
         ssize_t got = read(request->body_fd, buffer, piece);
-        if (got <= 0) return CURL_READFUNC_ABORT;
+        if (got <= 0)
+            return CURL_READFUNC_ABORT;
         piece = (size_t)got;
     }
     t->at += piece;
-    if (request->sent) request->sent(request->user, t->at, request->n_body);
+    if (request->sent)
+        request->sent(request->user, t->at, request->n_body);
     return piece;
 }
 
@@ -119,7 +120,8 @@ static size_t on_send(char *buffer, size_t size, size_t n, void *user)
 static int on_rewind(void *user, curl_off_t offset, int origin)
 {
     struct transfer *t = user;
-    if (origin != SEEK_SET) return CURL_SEEKFUNC_CANTSEEK;
+    if (origin != SEEK_SET)
+        return CURL_SEEKFUNC_CANTSEEK;
     if (!t->request->body && lseek(t->request->body_fd, (off_t)offset - (off_t)t->at, SEEK_CUR) < 0)
         return CURL_SEEKFUNC_CANTSEEK;
     t->at = (uint64_t)offset;
@@ -130,11 +132,14 @@ static int collect(struct transfer *t, const char *bytes, size_t n)
 {
     struct http_response *r = t->response;
     size_t wanted = r->n_body + n + 1, capacity = t->capacity ? t->capacity : 4096;
-    if (wanted > MAX_COLLECTED) return 0;
-    while (capacity < wanted) capacity *= 2;
+    if (wanted > MAX_COLLECTED)
+        return 0;
+    while (capacity < wanted)
+        capacity *= 2;
     if (capacity != t->capacity) {
         char *body = realloc(r->body, capacity);
-        if (!body) return 0;
+        if (!body)
+            return 0;
         r->body = body;
         t->capacity = capacity;
     }
@@ -149,8 +154,10 @@ static size_t on_receive(char *bytes, size_t size, size_t n, void *user)
     struct transfer *t = user;
     long status = 0;
     curl_easy_getinfo(t->easy, CURLINFO_RESPONSE_CODE, &status);
-    if (!t->request->sink || status < 200 || status > 299) return collect(t, bytes, size * n) ? size * n : 0;
-    if (t->request->sink(t->request->user, bytes, size * n) == size * n) return size * n;
+    if (!t->request->sink || status < 200 || status > 299)
+        return collect(t, bytes, size * n) ? size * n : 0;
+    if (t->request->sink(t->request->user, bytes, size * n) == size * n)
+        return size * n;
     t->stopped = 1;
     return 0;
 }
@@ -158,9 +165,12 @@ static size_t on_receive(char *bytes, size_t size, size_t n, void *user)
 static void keep_header(char *out, size_t capacity, const char *line, size_t n, const char *name)
 {
     size_t length = strlen(name);
-    if (n <= length || strncasecmp(line, name, length) || line[length] != ':') return;
-    for (length++; length < n && (line[length] == ' ' || line[length] == '\t'); length++) {}
-    while (n > length && (line[n - 1] == '\r' || line[n - 1] == '\n' || line[n - 1] == ' ')) n--;
+    if (n <= length || strncasecmp(line, name, length) || line[length] != ':')
+        return;
+    for (length++; length < n && (line[length] == ' ' || line[length] == '\t'); length++) {
+    }
+    while (n > length && (line[n - 1] == '\r' || line[n - 1] == '\n' || line[n - 1] == ' '))
+        n--;
     snprintf(out, capacity, "%.*s", (int)(n - length), line + length);
 }
 
@@ -173,7 +183,8 @@ static size_t on_header(char *line, size_t size, size_t n, void *user)
     keep_header(r->etag, sizeof r->etag, line, n, "ETag");
     keep_header(r->location, sizeof r->location, line, n, "Location");
     keep_header(seconds, sizeof seconds, line, n, "Retry-After");
-    if (seconds[0]) r->retry_after_s = atoi(seconds);
+    if (seconds[0])
+        r->retry_after_s = atoi(seconds);
     return n;
 }
 
@@ -182,7 +193,8 @@ static size_t on_header(char *line, size_t size, size_t n, void *user)
 static int add_header(struct transfer *t, const char *line)
 {
     struct curl_slist *list = curl_slist_append(t->headers, line);
-    if (list) t->headers = list;
+    if (list)
+        t->headers = list;
     return list != NULL;
 }
 
@@ -196,7 +208,8 @@ static int set_headers(struct http_client *client, struct transfer *t)
     } else {
         ok = ok && add_header(t, "Content-Type:");
     }
-    for (int i = 0; i < HTTP_MAX_HEADERS && t->request->headers[i]; i++) ok = ok && add_header(t, t->request->headers[i]);
+    for (int i = 0; i < HTTP_MAX_HEADERS && t->request->headers[i]; i++)
+        ok = ok && add_header(t, t->request->headers[i]);
     curl_easy_setopt(t->easy, CURLOPT_HTTPHEADER, t->headers);
     return ok;
 }
@@ -205,7 +218,8 @@ static void set_body(struct transfer *t)
 {
     const struct http_request *request = t->request;
     if (!request->body && request->body_fd <= 0) {
-        if (!strcmp(request->method, "HEAD")) curl_easy_setopt(t->easy, CURLOPT_NOBODY, 1L);
+        if (!strcmp(request->method, "HEAD"))
+            curl_easy_setopt(t->easy, CURLOPT_NOBODY, 1L);
         else if (!strcmp(request->method, "POST")) {
             curl_easy_setopt(t->easy, CURLOPT_POST, 1L);
             curl_easy_setopt(t->easy, CURLOPT_POSTFIELDSIZE, 0L);
@@ -242,10 +256,12 @@ static int transfer_init(struct transfer *t, struct http_client *client, const s
     t->request = request;
     t->response = response;
     t->code = CURLE_OUT_OF_MEMORY;
-    if (request->begin) request->begin(request->user);
+    if (request->begin)
+        request->begin(request->user);
     t->easy = curl_easy_init();
     t->url = join(client->base_url, request->path);
-    if (!t->easy || !t->url || !set_headers(client, t)) return 0;
+    if (!t->easy || !t->url || !set_headers(client, t))
+        return 0;
     curl_easy_setopt(t->easy, CURLOPT_URL, t->url);
     curl_easy_setopt(t->easy, CURLOPT_USERAGENT, client->agent);
     curl_easy_setopt(t->easy, CURLOPT_ERRORBUFFER, t->error);
@@ -262,19 +278,25 @@ static int transfer_init(struct transfer *t, struct http_client *client, const s
 
 static http_outcome outcome_of(const struct transfer *t)
 {
-    if (!t->done || t->stopped || t->code == CURLE_ABORTED_BY_CALLBACK) return HTTP_INTERRUPTED;
+    if (!t->done || t->stopped || t->code == CURLE_ABORTED_BY_CALLBACK)
+        return HTTP_INTERRUPTED;
     switch (t->code) {
-    case CURLE_OK: return HTTP_ANSWERED;
-    case CURLE_OUT_OF_MEMORY: return HTTP_NO_MEMORY;
+    case CURLE_OK:
+        return HTTP_ANSWERED;
+    case CURLE_OUT_OF_MEMORY:
+        return HTTP_NO_MEMORY;
     case CURLE_URL_MALFORMAT:
-    case CURLE_UNSUPPORTED_PROTOCOL: return HTTP_REFUSED_URL;
+    case CURLE_UNSUPPORTED_PROTOCOL:
+        return HTTP_REFUSED_URL;
     case CURLE_COULDNT_CONNECT:
     case CURLE_COULDNT_RESOLVE_HOST:
-    case CURLE_COULDNT_RESOLVE_PROXY: return HTTP_UNREACHABLE;
+    case CURLE_COULDNT_RESOLVE_PROXY:
+        return HTTP_UNREACHABLE;
     /* A server that refuses a body early may close before it has read it; the answer counts. */
     case CURLE_SEND_ERROR:
         return t->response->status >= 400 && t->response->n_body ? HTTP_ANSWERED : HTTP_BROKEN;
-    default: return HTTP_BROKEN;
+    default:
+        return HTTP_BROKEN;
     }
 }
 
@@ -282,7 +304,8 @@ static http_outcome transfer_finish(struct transfer *t, struct http_client *clie
 {
     long status = 0;
     http_outcome outcome;
-    if (!t->easy) return HTTP_NO_MEMORY;
+    if (!t->easy)
+        return HTTP_NO_MEMORY;
     curl_easy_getinfo(t->easy, CURLINFO_RESPONSE_CODE, &status);
     t->response->status = (int)status;
     outcome = outcome_of(t);
@@ -303,7 +326,8 @@ static void note_ended(CURLM *multi, struct transfer *transfers, size_t n)
     CURLMsg *message;
     int left;
     while ((message = curl_multi_info_read(multi, &left))) {
-        if (message->msg != CURLMSG_DONE) continue;
+        if (message->msg != CURLMSG_DONE)
+            continue;
         for (size_t i = 0; i < n; i++)
             if (transfers[i].easy == message->easy_handle) {
                 transfers[i].done = 1;
@@ -315,7 +339,8 @@ static void note_ended(CURLM *multi, struct transfer *transfers, size_t n)
 static int vital_ended(const struct transfer *transfers, size_t n)
 {
     for (size_t i = 0; i < n; i++)
-        if (transfers[i].done && !transfers[i].stopped && transfers[i].request->is_vital) return 1;
+        if (transfers[i].done && !transfers[i].stopped && transfers[i].request->is_vital)
+            return 1;
     return 0;
 }
 
@@ -326,37 +351,45 @@ static double now_ms(void)
     return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
 }
 
-static void run(struct http_client *client, struct transfer *transfers, size_t n, void (*tick)(void *user), void *tick_user)
+static void run(struct http_client *client, struct transfer *transfers, size_t n, void (*tick)(void *user),
+                void *tick_user)
 {
     int running = 1;
     double last = 0;
     while (running) {
-        if (client->interrupted && client->interrupted(client->user)) return;
-        if (curl_multi_perform(client->multi, &running) != CURLM_OK) return;
+        if (client->interrupted && client->interrupted(client->user))
+            return;
+        if (curl_multi_perform(client->multi, &running) != CURLM_OK)
+            return;
         note_ended(client->multi, transfers, n);
-        if (vital_ended(transfers, n)) return;
+        if (vital_ended(transfers, n))
+            return;
         if (tick && now_ms() - last >= TICK_MS) {
             tick(tick_user);
             last = now_ms();
         }
-        if (running && curl_multi_poll(client->multi, NULL, 0, TICK_MS, NULL) != CURLM_OK) return;
+        if (running && curl_multi_poll(client->multi, NULL, 0, TICK_MS, NULL) != CURLM_OK)
+            return;
     }
 }
 
 void http_perform_all(struct http_client *client, const struct http_request *requests, size_t n,
-                      struct http_response *responses, http_outcome *outcomes,
-                      void (*tick)(void *user), void *tick_user)
+                      struct http_response *responses, http_outcome *outcomes, void (*tick)(void *user),
+                      void *tick_user)
 {
     struct transfer *transfers = calloc(n ? n : 1, sizeof *transfers);
     for (size_t i = 0; i < n; i++) {
         memset(&responses[i], 0, sizeof responses[i]);
         outcomes[i] = HTTP_NO_MEMORY;
     }
-    if (!transfers) return;
+    if (!transfers)
+        return;
     for (size_t i = 0; i < n; i++)
-        if (!transfer_init(&transfers[i], client, &requests[i], &responses[i])) transfers[i].done = 1;
+        if (!transfer_init(&transfers[i], client, &requests[i], &responses[i]))
+            transfers[i].done = 1;
     run(client, transfers, n, tick, tick_user);
-    for (size_t i = 0; i < n; i++) outcomes[i] = transfer_finish(&transfers[i], client);
+    for (size_t i = 0; i < n; i++)
+        outcomes[i] = transfer_finish(&transfers[i], client);
     free(transfers);
 }
 

@@ -25,8 +25,10 @@ static void append_encoded(struct url *url, const char *text)
     static const char hex[] = "0123456789ABCDEF";
     for (const unsigned char *c = (const unsigned char *)text; *c; c++) {
         char escaped[3] = {'%', hex[*c >> 4], hex[*c & 15]};
-        if (is_unreserved(*c)) append(url, (const char *)c, 1);
-        else append(url, escaped, 3);
+        if (is_unreserved(*c))
+            append(url, (const char *)c, 1);
+        else
+            append(url, escaped, 3);
     }
 }
 
@@ -44,7 +46,8 @@ void url_segment(struct url *url, const char *segment)
 
 void url_query(struct url *url, const char *name, const char *value)
 {
-    if (!value) return;
+    if (!value)
+        return;
     append(url, url->has_query ? "&" : "?", 1);
     append(url, name, strlen(name));
     append(url, "=", 1);

@@ -17,7 +17,8 @@ static void print_value(const cJSON *value)
 static void print_properties(const cJSON *schema, const char *prefix)
 {
     const cJSON *property;
-    cJSON_ArrayForEach(property, cJSON_GetObjectItemCaseSensitive(schema, "properties")) {
+    cJSON_ArrayForEach(property, cJSON_GetObjectItemCaseSensitive(schema, "properties"))
+    {
         char path[256];
         snprintf(path, sizeof path, "%s%s%s", prefix, prefix[0] ? "." : "", property->string);
         if (cJSON_GetObjectItemCaseSensitive(property, "properties")) {
@@ -41,8 +42,10 @@ int command_options(struct groomctl *ctl, const struct arguments *arguments)
 {
     cJSON *answer = NULL;
     int status = api_json(ctl, "GET", "/v1/options", NULL, NULL, &answer);
-    if (status == DONE && ctl->json) api_print(ctl, answer);
-    else if (status == DONE) print_properties(fit_schema(answer), "");
+    if (status == DONE && ctl->json)
+        api_print(ctl, answer);
+    else if (status == DONE)
+        print_properties(fit_schema(answer), "");
     cJSON_Delete(answer);
     return status;
 }
@@ -53,9 +56,12 @@ int command_health(struct groomctl *ctl, const struct arguments *arguments)
 {
     cJSON *alive = NULL, *ready = NULL;
     int status = api_json(ctl, "GET", "/healthz", NULL, NULL, &alive);
-    if (status == DONE) status = api_json(ctl, "GET", "/readyz", NULL, NULL, &ready);
-    if (status == DONE && ctl->json) api_print(ctl, ready ? ready : alive);
-    else if (status == DONE) printf("%s is alive and ready\n", http_client_base_url(ctl->client));
+    if (status == DONE)
+        status = api_json(ctl, "GET", "/readyz", NULL, NULL, &ready);
+    if (status == DONE && ctl->json)
+        api_print(ctl, ready ? ready : alive);
+    else if (status == DONE)
+        printf("%s is alive and ready\n", http_client_base_url(ctl->client));
     cJSON_Delete(alive);
     cJSON_Delete(ready);
     return status;

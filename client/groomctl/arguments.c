@@ -3,10 +3,12 @@
 #include <stdio.h>
 #include <string.h>
 
-static const struct option_spec *find(const struct option_spec *table, const char *name, size_t n_name, char letter)
+static const struct option_spec *find(const struct option_spec *table, const char *name, size_t n_name,
+                                      char letter)
 {
     for (; table && table->name; table++)
-        if (letter ? table->letter == letter : strlen(table->name) == n_name && !strncmp(table->name, name, n_name))
+        if (letter ? table->letter == letter
+                   : strlen(table->name) == n_name && !strncmp(table->name, name, n_name))
             return table;
     return NULL;
 }
@@ -27,7 +29,8 @@ struct reading {
 static int add(struct reading *r, const struct option_spec *spec, const char *value)
 {
     struct arguments *a = r->arguments;
-    if (a->n_options == ARGUMENTS_MAX) return complain(a, "too many options, from", r->argv[r->at]);
+    if (a->n_options == ARGUMENTS_MAX)
+        return complain(a, "too many options, from", r->argv[r->at]);
     a->options[a->n_options].spec = spec;
     a->options[a->n_options++].value = value ? value : "";
     return 1;
@@ -42,20 +45,27 @@ static int read_option(struct reading *r)
     char letter = is_long ? 0 : text[1];
     size_t n_name = equals ? (size_t)(equals - name) : strlen(name);
     const struct option_spec *spec = find(r->table, name, n_name, letter);
-    if (!spec) spec = find(r->more, name, n_name, letter);
-    if (!spec) return complain(r->arguments, "there is no option", text);
-    if (equals) value = equals + 1;
-    else if (!is_long && text[2]) value = text + 2;
-    if (!spec->value && value) return complain(r->arguments, "no value belongs to", text);
+    if (!spec)
+        spec = find(r->more, name, n_name, letter);
+    if (!spec)
+        return complain(r->arguments, "there is no option", text);
+    if (equals)
+        value = equals + 1;
+    else if (!is_long && text[2])
+        value = text + 2;
+    if (!spec->value && value)
+        return complain(r->arguments, "no value belongs to", text);
     if (spec->value && !value) {
-        if (r->at + 1 >= r->argc) return complain(r->arguments, "a value is missing behind", text);
+        if (r->at + 1 >= r->argc)
+            return complain(r->arguments, "a value is missing behind", text);
         return add(r, spec, r->argv[++r->at]);
     }
     return add(r, spec, value);
 }
 
-int arguments_parse(int argc, char *const *argv, const struct option_spec *table, const struct option_spec *more,
-                    int stop_at_operand, int *argc_read, struct arguments *arguments)
+int arguments_parse(int argc, char *const *argv, const struct option_spec *table,
+                    const struct option_spec *more, int stop_at_operand, int *argc_read,
+                    struct arguments *arguments)
 {
     struct reading r = {.argc = argc, .argv = argv, .table = table, .more = more, .arguments = arguments};
     int only_operands = 0;
@@ -65,27 +75,33 @@ int arguments_parse(int argc, char *const *argv, const struct option_spec *table
         if (!only_operands && !strcmp(text, "--")) {
             only_operands = 1;
         } else if (!only_operands && text[0] == '-' && text[1]) {
-            if (!read_option(&r)) return 0;
+            if (!read_option(&r))
+                return 0;
         } else {
-            if (stop_at_operand) break;
-            if (arguments->n_operands == ARGUMENTS_MAX) return complain(arguments, "too many arguments, from", text);
+            if (stop_at_operand)
+                break;
+            if (arguments->n_operands == ARGUMENTS_MAX)
+                return complain(arguments, "too many arguments, from", text);
             arguments->operands[arguments->n_operands++] = text;
         }
     }
-    if (argc_read) *argc_read = r.at;
+    if (argc_read)
+        *argc_read = r.at;
     return 1;
 }
 
 const char *argument(const struct arguments *arguments, const char *name)
 {
     for (size_t i = arguments->n_options; i-- > 0;)
-        if (!strcmp(arguments->options[i].spec->name, name)) return arguments->options[i].value;
+        if (!strcmp(arguments->options[i].spec->name, name))
+            return arguments->options[i].value;
     return NULL;
 }
 
 const char *argument_nth(const struct arguments *arguments, const char *name, size_t n)
 {
     for (size_t i = 0; i < arguments->n_options; i++)
-        if (!strcmp(arguments->options[i].spec->name, name) && n-- == 0) return arguments->options[i].value;
+        if (!strcmp(arguments->options[i].spec->name, name) && n-- == 0)
+            return arguments->options[i].value;
     return NULL;
 }

@@ -16,21 +16,26 @@
 /* --- options ---------------------------------------------------------------------------- */
 
 /* Options of the command line that are members of the job's options by another spelling. */
-static const struct { const char *option, *member; } members[] = {
-    {"guides", "guides"},   {"operator-guides", "operator_guides"}, {"vertices", "vertices"},
-    {"quality", "quality"}, {"seed", "seed"},
+static const struct {
+    const char *option, *member;
+} members[] = {
+    {"guides", "guides"},     {"operator-guides", "operator_guides"},
+    {"vertices", "vertices"}, {"quality", "quality"},
+    {"seed", "seed"},
 };
 
 /* "scale,curl" -> ["scale","curl"]; "auto" stays a word. */
 static cJSON *operator_list(const char *text)
 {
-    if (!strcmp(text, "auto")) return cJSON_CreateString(text);
+    if (!strcmp(text, "auto"))
+        return cJSON_CreateString(text);
     cJSON *list = cJSON_CreateArray();
     while (*text) {
         char name[32];
         size_t n = strcspn(text, ",");
         snprintf(name, sizeof name, "%.*s", (int)n, text);
-        if (n) cJSON_AddItemToArray(list, cJSON_CreateString(name));
+        if (n)
+            cJSON_AddItemToArray(list, cJSON_CreateString(name));
         text += n + (text[n] == ',');
     }
     return list;
@@ -40,7 +45,8 @@ static cJSON *operator_list(const char *text)
 static int add_cameras(cJSON *options, const char *path)
 {
     cJSON *json = read_json_file(path);
-    if (!json) return 0;
+    if (!json)
+        return 0;
     cJSON_DeleteItemFromObjectCaseSensitive(options, "visibility");
     cJSON_AddItemToObject(options, "visibility", json);
     return 1;
@@ -50,8 +56,10 @@ static int read_options_file(const struct arguments *arguments, cJSON **options)
 {
     const char *path = argument(arguments, "options");
     *options = path ? read_json_file(path) : cJSON_CreateObject();
-    if (cJSON_IsObject(*options)) return 1;
-    if (*options) fprintf(stderr, "groomctl: %s does not hold a JSON object\n", path);
+    if (cJSON_IsObject(*options))
+        return 1;
+    if (*options)
+        fprintf(stderr, "groomctl: %s does not hold a JSON object\n", path);
     return 0;
 }
 
@@ -59,10 +67,12 @@ static int build_options(const struct arguments *arguments, cJSON **out)
 {
     cJSON *options;
     const char *value;
-    if (!read_options_file(arguments, &options)) return REFUSED;
+    if (!read_options_file(arguments, &options))
+        return REFUSED;
     *out = options;
     for (size_t i = 0; i < sizeof members / sizeof members[0]; i++) {
-        if (!(value = argument(arguments, members[i].option))) continue;
+        if (!(value = argument(arguments, members[i].option)))
+            continue;
         cJSON_DeleteItemFromObjectCaseSensitive(options, members[i].member);
         cJSON_AddItemToObject(options, members[i].member, json_value(value));
     }
@@ -70,30 +80,37 @@ static int build_options(const struct arguments *arguments, cJSON **out)
         cJSON_DeleteItemFromObjectCaseSensitive(options, "operators");
         cJSON_AddItemToObject(options, "operators", operator_list(value));
     }
-    if ((value = argument(arguments, "cameras")) && !add_cameras(options, value)) return REFUSED;
+    if ((value = argument(arguments, "cameras")) && !add_cameras(options, value))
+        return REFUSED;
     for (size_t i = 0; (value = argument_nth(arguments, "option", i)); i++)
         if (!json_set_path(options, value))
-            return groomctl_usage_error("fit", "--option %s is not path=value (stages.initialize.n_smooth=40)", value);
+            return groomctl_usage_error(
+                "fit", "--option %s is not path=value (stages.initialize.n_smooth=40)", value);
     return DONE;
 }
 
 /* --- inputs --------------------------------------------------------------------------------- */
 
 /* An id stays as it is; anything else is a file to upload. */
-static int resolve(struct groomctl *ctl, const struct arguments *arguments, enum sized_thing thing, const char *what,
-                   char id[64])
+static int resolve(struct groomctl *ctl, const struct arguments *arguments, enum sized_thing thing,
+                   const char *what, char id[64])
 {
     struct upload_options options = upload_options_of(arguments);
     cJSON *answer = NULL;
-    if (!strncmp(what, thing == SIZED_HEAD ? "head_" : "str_", thing == SIZED_HEAD ? 5 : 4) && access(what, F_OK)) {
+    if (!strncmp(what, thing == SIZED_HEAD ? "head_" : "str_", thing == SIZED_HEAD ? 5 : 4) &&
+        access(what, F_OK)) {
         snprintf(id, 64, "%s", what);
         return DONE;
     }
-    if (thing == SIZED_HEAD) options.format = options.name = NULL;
-    if (thing == SIZED_HEAD && argument(arguments, "head-unit")) options.unit = argument(arguments, "head-unit");
-    if (thing == SIZED_HEAD && argument(arguments, "head-up")) options.up = argument(arguments, "head-up");
+    if (thing == SIZED_HEAD)
+        options.format = options.name = NULL;
+    if (thing == SIZED_HEAD && argument(arguments, "head-unit"))
+        options.unit = argument(arguments, "head-unit");
+    if (thing == SIZED_HEAD && argument(arguments, "head-up"))
+        options.up = argument(arguments, "head-up");
     int status = upload_file(ctl, thing, what, &options, &answer);
-    if (status == DONE) upload_describe(ctl, thing, &options, answer);
+    if (status == DONE)
+        upload_describe(ctl, thing, &options, answer);
     snprintf(id, 64, "%s", api_text(answer, "id"));
     cJSON_Delete(answer);
     return status;
@@ -108,9 +125,12 @@ static void idempotency_header(char *header, size_t size)
     FILE *random = fopen("/dev/urandom", "rb");
     size_t n = (size_t)snprintf(header, size, "Idempotency-Key: groomctl-");
     if (!random || fread(bytes, 1, sizeof bytes, random) != sizeof bytes)
-        snprintf((char *)bytes, sizeof bytes, "%lx", (unsigned long)time(NULL) ^ (unsigned long)getpid() << 20);
-    if (random) fclose(random);
-    for (size_t i = 0; i < sizeof bytes; i++) n += (size_t)snprintf(header + n, size - n, "%02x", bytes[i]);
+        snprintf((char *)bytes, sizeof bytes, "%lx",
+                 (unsigned long)time(NULL) ^ (unsigned long)getpid() << 20);
+    if (random)
+        fclose(random);
+    for (size_t i = 0; i < sizeof bytes; i++)
+        n += (size_t)snprintf(header + n, size - n, "%02x", bytes[i]);
 }
 
 static int submit(struct groomctl *ctl, const char *strands, const char *head, cJSON *options, cJSON **job)
@@ -120,14 +140,16 @@ static int submit(struct groomctl *ctl, const char *strands, const char *head, c
     idempotency_header(header, sizeof header);
     cJSON_AddStringToObject(body, "kind", "fit");
     cJSON_AddStringToObject(body, "strands", strands);
-    if (head[0]) cJSON_AddStringToObject(body, "head", head);
+    if (head[0])
+        cJSON_AddStringToObject(body, "head", head);
     cJSON_AddItemReferenceToObject(body, "options", options);
     int status = api_json(ctl, "POST", "/v1/jobs", body, header, job);
     cJSON_Delete(body);
     return status;
 }
 
-static int export_result(struct groomctl *ctl, const struct arguments *arguments, const char *groom, const char *path)
+static int export_result(struct groomctl *ctl, const struct arguments *arguments, const char *groom,
+                         const char *path)
 {
     const char *format = argument(arguments, "output-format");
     struct url url;
@@ -138,7 +160,8 @@ static int export_result(struct groomctl *ctl, const struct arguments *arguments
     url_query(&url, "unit", argument(arguments, "unit"));
     url_query(&url, "up", argument(arguments, "up"));
     int status = download_file(ctl, url.text, path);
-    if (status == DONE && !ctl->json) printf("%s\n", path);
+    if (status == DONE && !ctl->json)
+        printf("%s\n", path);
     return status;
 }
 
@@ -155,24 +178,33 @@ static int follow(struct groomctl *ctl, const struct arguments *arguments, const
     struct job_view view;
     job_view_init(&view, job);
     int status = jobs_watch_all(ctl, &view, 1);
-    if (status == DONE && argument(arguments, "groom-id-file")) status = write_id(view.groom, argument(arguments, "groom-id-file"));
+    if (status == DONE && argument(arguments, "groom-id-file"))
+        status = write_id(view.groom, argument(arguments, "groom-id-file"));
     return status == DONE && path ? export_result(ctl, arguments, view.groom, path) : status;
 }
 
 static int run(struct groomctl *ctl, const struct arguments *arguments, cJSON *options)
 {
     char strands[64] = "", head[64] = "";
-    const char *head_name = argument(arguments, "head-file") ? argument(arguments, "head-file") : argument(arguments, "head");
-    int waits = argument(arguments, "wait") || argument(arguments, "output") || argument(arguments, "groom-id-file");
+    const char *head_name =
+        argument(arguments, "head-file") ? argument(arguments, "head-file") : argument(arguments, "head");
+    int waits =
+        argument(arguments, "wait") || argument(arguments, "output") || argument(arguments, "groom-id-file");
     cJSON *job = NULL;
     int status = resolve(ctl, arguments, SIZED_HAIR, arguments->operands[0], strands);
-    if (status == DONE && head_name) status = resolve(ctl, arguments, SIZED_HEAD, head_name, head);
-    if (status == DONE) status = submit(ctl, strands, head, options, &job);
-    if (status == DONE && ctl->json) api_print(ctl, job);
-    else if (status == DONE) printf("%s\n", api_text(job, "id"));
+    if (status == DONE && head_name)
+        status = resolve(ctl, arguments, SIZED_HEAD, head_name, head);
+    if (status == DONE)
+        status = submit(ctl, strands, head, options, &job);
+    if (status == DONE && ctl->json)
+        api_print(ctl, job);
+    else if (status == DONE)
+        printf("%s\n", api_text(job, "id"));
     fflush(stdout);
-    if (status == DONE && waits) status = follow(ctl, arguments, api_text(job, "id"));
-    else if (status == DONE && !ctl->json) fprintf(stderr, "watch it: groomctl watch %s\n", api_text(job, "id"));
+    if (status == DONE && waits)
+        status = follow(ctl, arguments, api_text(job, "id"));
+    else if (status == DONE && !ctl->json)
+        fprintf(stderr, "watch it: groomctl watch %s\n", api_text(job, "id"));
     cJSON_Delete(job);
     return status;
 }
@@ -182,10 +214,13 @@ int command_fit(struct groomctl *ctl, const struct arguments *arguments)
     const char *path = argument(arguments, "output");
     cJSON *options = NULL;
     if (path && !argument(arguments, "output-format") && !format_of_path(path))
-        return groomctl_usage_error("fit", "%s has no extension that names a format; add --output-format F", path);
-    if (path && !output_file_check(path)) return REFUSED; /* before minutes of work, not after */
+        return groomctl_usage_error("fit", "%s has no extension that names a format; add --output-format F",
+                                    path);
+    if (path && !output_file_check(path))
+        return REFUSED; /* before minutes of work, not after */
     int status = build_options(arguments, &options);
-    if (status == DONE) status = run(ctl, arguments, options);
+    if (status == DONE)
+        status = run(ctl, arguments, options);
     cJSON_Delete(options);
     return status;
 }

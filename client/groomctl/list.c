@@ -24,10 +24,14 @@ enum { N_COLLECTIONS = sizeof collections / sizeof collections[0] };
 static void print_cell(const cJSON *row, const char *column)
 {
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(row, column);
-    if (cJSON_IsString(item)) printf("%-12s  ", item->valuestring);
-    else if (!cJSON_IsNumber(item)) printf("%-12s  ", "-");
-    else if (!strcmp(column, "progress")) printf("%3.0f %%  ", 100 * item->valuedouble);
-    else printf("%12.0f  ", item->valuedouble);
+    if (cJSON_IsString(item))
+        printf("%-12s  ", item->valuestring);
+    else if (!cJSON_IsNumber(item))
+        printf("%-12s  ", "-");
+    else if (!strcmp(column, "progress"))
+        printf("%3.0f %%  ", 100 * item->valuedouble);
+    else
+        printf("%12.0f  ", item->valuedouble);
 }
 
 static void print_row(const struct groomctl *ctl, const struct collection *collection, const cJSON *row)
@@ -36,7 +40,8 @@ static void print_row(const struct groomctl *ctl, const struct collection *colle
         api_print(ctl, row);
         return;
     }
-    for (int i = 0; collection->columns[i]; i++) print_cell(row, collection->columns[i]);
+    for (int i = 0; collection->columns[i]; i++)
+        print_cell(row, collection->columns[i]);
     printf("\n");
 }
 
@@ -57,10 +62,12 @@ static int list(struct groomctl *ctl, const struct collection *collection, const
     url_query(&url, "before", argument(arguments, "before"));
     url_query(&url, "state", argument(arguments, "state"));
     int status = api_json(ctl, "GET", url.text, NULL, NULL, &page);
-    if (status != DONE) return status;
+    if (status != DONE)
+        return status;
     cJSON_ArrayForEach(row, rows_of(collection, page)) { print_row(ctl, collection, row); }
     if (!ctl->json && api_number(page, "next", 0) > 0)
-        fprintf(stderr, "there is more: groomctl list %s --before %.0f\n", collection->name, api_number(page, "next", 0));
+        fprintf(stderr, "there is more: groomctl list %s --before %.0f\n", collection->name,
+                api_number(page, "next", 0));
     cJSON_Delete(page);
     return DONE;
 }
@@ -68,8 +75,10 @@ static int list(struct groomctl *ctl, const struct collection *collection, const
 int command_list(struct groomctl *ctl, const struct arguments *arguments)
 {
     for (int i = 0; i < N_COLLECTIONS; i++)
-        if (!strcmp(arguments->operands[0], collections[i].name)) return list(ctl, &collections[i], arguments);
-    return groomctl_usage_error("list", "there is no list of \"%s\": strands, heads, jobs or grooms", arguments->operands[0]);
+        if (!strcmp(arguments->operands[0], collections[i].name))
+            return list(ctl, &collections[i], arguments);
+    return groomctl_usage_error("list", "there is no list of \"%s\": strands, heads, jobs or grooms",
+                                arguments->operands[0]);
 }
 
 /* --- get ----------------------------------------------------------------------------------- */
@@ -77,7 +86,8 @@ int command_list(struct groomctl *ctl, const struct arguments *arguments)
 static const struct collection *collection_of(const char *id)
 {
     for (int i = 0; i < N_COLLECTIONS; i++)
-        if (!strncmp(id, collections[i].prefix, strlen(collections[i].prefix))) return &collections[i];
+        if (!strncmp(id, collections[i].prefix, strlen(collections[i].prefix)))
+            return &collections[i];
     return NULL;
 }
 
@@ -87,14 +97,18 @@ int command_get(struct groomctl *ctl, const struct arguments *arguments)
     const struct collection *collection = collection_of(id);
     struct url url;
     cJSON *answer = NULL;
-    if (!collection) return groomctl_usage_error("get", "\"%s\" is no id: they start with str_, head_, job_ or grm_", id);
+    if (!collection)
+        return groomctl_usage_error("get", "\"%s\" is no id: they start with str_, head_, job_ or grm_", id);
     url_init(&url, collection->path);
     url_segment(&url, id);
     url_query(&url, "revision", argument(arguments, "revision"));
-    if (path) return download_file(ctl, url.text, path);
-    if (!strcmp(collection->name, "grooms") && !argument(arguments, "arrays")) url_query(&url, "arrays", "false");
+    if (path)
+        return download_file(ctl, url.text, path);
+    if (!strcmp(collection->name, "grooms") && !argument(arguments, "arrays"))
+        url_query(&url, "arrays", "false");
     int status = api_json(ctl, "GET", url.text, NULL, NULL, &answer);
-    if (status == DONE) api_print(ctl, answer);
+    if (status == DONE)
+        api_print(ctl, answer);
     cJSON_Delete(answer);
     return status;
 }

@@ -11,16 +11,19 @@ static char *read_stream(FILE *in, size_t *n_bytes)
     char *bytes = malloc(capacity);
     while (bytes && (got = fread(bytes + n, 1, capacity - 1 - n, in)) > 0) {
         n += got;
-        if (n + 1 < capacity) continue;
+        if (n + 1 < capacity)
+            continue;
         char *more = realloc(bytes, capacity *= 2);
-        if (!more) free(bytes);
+        if (!more)
+            free(bytes);
         bytes = more;
     }
     if (bytes && ferror(in)) {
         free(bytes);
         return NULL;
     }
-    if (bytes) bytes[n] = '\0';
+    if (bytes)
+        bytes[n] = '\0';
     *n_bytes = n;
     return bytes;
 }
@@ -30,8 +33,10 @@ char *read_whole_file(const char *path, size_t *n_bytes)
     int is_stdin = !strcmp(path, "-");
     FILE *in = is_stdin ? stdin : fopen(path, "rb");
     char *bytes = in ? read_stream(in, n_bytes) : NULL;
-    if (!bytes) fprintf(stderr, "groomctl: %s cannot be read: %s\n", path, strerror(errno));
-    if (in && !is_stdin) fclose(in);
+    if (!bytes)
+        fprintf(stderr, "groomctl: %s cannot be read: %s\n", path, strerror(errno));
+    if (in && !is_stdin)
+        fclose(in);
     return bytes;
 }
 
@@ -42,7 +47,8 @@ cJSON *read_json_file(const char *path)
     const char *end = bytes;
     cJSON *json = bytes ? cJSON_ParseWithLengthOpts(bytes, n + 1, &end, 1) : NULL;
     if (bytes && !json)
-        fprintf(stderr, "groomctl: %s is not JSON: it cannot be read from byte %zu on\n", path, end ? (size_t)(end - bytes) : 0);
+        fprintf(stderr, "groomctl: %s is not JSON: it cannot be read from byte %zu on\n", path,
+                end ? (size_t)(end - bytes) : 0);
     free(bytes);
     return json;
 }

@@ -14,21 +14,25 @@
 
 static int complain(groom_status status, const struct groom_diag *diag)
 {
-    fprintf(stderr, "groomctl: %s: %s\n", groom_status_message(status), diag->status == status ? diag->detail : "");
+    fprintf(stderr, "groomctl: %s: %s\n", groom_status_message(status),
+            diag->status == status ? diag->detail : "");
     return status == GROOM_EINVAL ? WRONG_USAGE : REFUSED;
 }
 
 /* --- options -------------------------------------------------------------------------------- */
 
-static int whole_number(const struct arguments *arguments, const char *name, uint64_t maximum, uint64_t *value)
+static int whole_number(const struct arguments *arguments, const char *name, uint64_t maximum,
+                        uint64_t *value)
 {
     const char *text = argument(arguments, name);
     char *end;
-    if (!text) return 1;
+    if (!text)
+        return 1;
     errno = 0;
     unsigned long long number = strtoull(text, &end, 10);
     if (errno || end == text || *end || text[0] == '-' || number > maximum) {
-        groomctl_usage_error("sample", "--%s is \"%s\"; it must be a whole number up to %llu", name, text, (unsigned long long)maximum);
+        groomctl_usage_error("sample", "--%s is \"%s\"; it must be a whole number up to %llu", name, text,
+                             (unsigned long long)maximum);
         return 0;
     }
     *value = number;
@@ -46,8 +50,10 @@ static int count(const struct arguments *arguments, const char *name, uint32_t *
 /* Fewer strands than the style's own guides ask for fewer guides. */
 static void fit_counts(const struct arguments *arguments, struct groom_sample_options *options)
 {
-    if (!argument(arguments, "guides") && options->n_guides > options->n_strands) options->n_guides = options->n_strands;
-    if (options->n_operator_guides > options->n_guides) options->n_operator_guides = options->n_guides;
+    if (!argument(arguments, "guides") && options->n_guides > options->n_strands)
+        options->n_guides = options->n_strands;
+    if (options->n_operator_guides > options->n_guides)
+        options->n_operator_guides = options->n_guides;
 }
 
 static int read_options(const struct arguments *arguments, struct groom_sample_options *options)
@@ -57,10 +63,14 @@ static int read_options(const struct arguments *arguments, struct groom_sample_o
     struct groom_diag diag;
     if (name && groom_sample_style_parse(name, &style, &diag) != GROOM_OK)
         return groomctl_usage_error("sample", "%s", diag.detail);
-    if (argument(arguments, "clean")) groom_sample_options_init(style, options);
-    else groom_sample_options_capture(style, options);
-    if (!count(arguments, "strands", &options->n_strands) || !count(arguments, "vertices", &options->n_vertices) ||
-        !count(arguments, "guides", &options->n_guides) || !whole_number(arguments, "seed", UINT64_MAX, &options->seed))
+    if (argument(arguments, "clean"))
+        groom_sample_options_init(style, options);
+    else
+        groom_sample_options_capture(style, options);
+    if (!count(arguments, "strands", &options->n_strands) ||
+        !count(arguments, "vertices", &options->n_vertices) ||
+        !count(arguments, "guides", &options->n_guides) ||
+        !whole_number(arguments, "seed", UINT64_MAX, &options->seed))
         return WRONG_USAGE;
     fit_counts(arguments, options);
     return DONE;
@@ -75,9 +85,12 @@ static int path_of(const char *folder, const char *name, char *path, size_t size
 
 static int finish_file(struct output_file *file, groom_status status, const struct groom_diag *diag)
 {
-    if (status == GROOM_OK) return output_file_commit(file) ? DONE : REFUSED;
-    if (file->failure[0]) fprintf(stderr, "groomctl: %s cannot be written: %s\n", file->path, file->failure);
-    else complain(status, diag);
+    if (status == GROOM_OK)
+        return output_file_commit(file) ? DONE : REFUSED;
+    if (file->failure[0])
+        fprintf(stderr, "groomctl: %s cannot be written: %s\n", file->path, file->failure);
+    else
+        complain(status, diag);
     output_file_abort(file);
     return REFUSED;
 }
@@ -87,7 +100,8 @@ static int write_strands(const struct groom_sample *sample, const char *path)
     struct output_file file;
     struct groom_diag diag = {0};
     struct groom_write_options options = {.format = GROOM_FORMAT_HAIR, .frame = {.unit_m = 1}};
-    if (!output_file_open(&file, path)) return REFUSED;
+    if (!output_file_open(&file, path))
+        return REFUSED;
     groom_status st = groom_strands_write(sample->capture, &options, output_file_sink(&file), NULL, &diag);
     return finish_file(&file, st, &diag);
 }
@@ -96,8 +110,10 @@ static int write_head(const struct groom_sample *sample, const char *path)
 {
     struct output_file file;
     struct groom_diag diag = {0};
-    if (!output_file_open(&file, path)) return REFUSED;
-    groom_status st = groom_mesh_write_obj(sample->head, (struct groom_frame){.unit_m = 1}, output_file_sink(&file), &diag);
+    if (!output_file_open(&file, path))
+        return REFUSED;
+    groom_status st =
+        groom_mesh_write_obj(sample->head, (struct groom_frame){.unit_m = 1}, output_file_sink(&file), &diag);
     return finish_file(&file, st, &diag);
 }
 
@@ -117,7 +133,9 @@ static int write_cameras(const struct groom_sample *sample, const char *path)
     struct groom_diag diag = {0};
     char *json = NULL;
     groom_status st = groom_sample_cameras_print(sample, &json, &diag);
-    int status = st != GROOM_OK ? complain(st, &diag) : output_file_save(path, json, strlen(json)) ? DONE : REFUSED;
+    int status = st != GROOM_OK                               ? complain(st, &diag)
+                 : output_file_save(path, json, strlen(json)) ? DONE
+                                                              : REFUSED;
     free(json);
     return status;
 }
@@ -125,7 +143,10 @@ static int write_cameras(const struct groom_sample *sample, const char *path)
 static const struct {
     const char *name;
     int (*write)(const struct groom_sample *sample, const char *path);
-} files[] = {{"strands.hair", write_strands}, {"head.obj", write_head}, {"truth.groom.json", write_truth}, {"cameras.json", write_cameras}};
+} files[] = {{"strands.hair", write_strands},
+             {"head.obj", write_head},
+             {"truth.groom.json", write_truth},
+             {"cameras.json", write_cameras}};
 
 static int print_summary(const struct groomctl *ctl, const struct groom_sample *sample, const char *folder)
 {
@@ -146,10 +167,13 @@ static int write_files(const struct groomctl *ctl, const struct groom_sample *sa
         return REFUSED;
     }
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
-        if (!path_of(folder, files[i].name, path, sizeof path)) return groomctl_usage_error("sample", "the folder's name is too long");
+        if (!path_of(folder, files[i].name, path, sizeof path))
+            return groomctl_usage_error("sample", "the folder's name is too long");
         int status = files[i].write(sample, path);
-        if (status != DONE) return status;
-        if (!ctl->json) printf("%s\n", path);
+        if (status != DONE)
+            return status;
+        if (!ctl->json)
+            printf("%s\n", path);
     }
     return ctl->json ? print_summary(ctl, sample, folder) : DONE;
 }
@@ -161,11 +185,14 @@ int command_sample(struct groomctl *ctl, const struct arguments *arguments)
     struct groom_sample *sample = NULL;
     struct groom_context context = {0};
     struct groom_diag diag = {0};
-    if (!folder) return groomctl_usage_error("sample", "-o FOLDER is needed");
+    if (!folder)
+        return groomctl_usage_error("sample", "-o FOLDER is needed");
     int status = read_options(arguments, &options);
-    if (status != DONE) return status;
+    if (status != DONE)
+        return status;
     groom_status st = groom_pool_create(0, &context.pool);
-    if (st == GROOM_OK) st = groom_sample_create(&options, &context, &sample, &diag);
+    if (st == GROOM_OK)
+        st = groom_sample_create(&options, &context, &sample, &diag);
     status = st == GROOM_OK ? write_files(ctl, sample, folder) : complain(st, &diag);
     groom_sample_destroy(sample);
     groom_pool_destroy(context.pool);

@@ -13,8 +13,10 @@
 
 struct upload_options upload_options_of(const struct arguments *arguments)
 {
-    return (struct upload_options){.format = argument(arguments, "format"), .unit = argument(arguments, "unit"),
-                                   .up = argument(arguments, "up"), .name = argument(arguments, "name")};
+    return (struct upload_options){.format = argument(arguments, "format"),
+                                   .unit = argument(arguments, "unit"),
+                                   .up = argument(arguments, "up"),
+                                   .name = argument(arguments, "name")};
 }
 
 /* --- the bar ---------------------------------------------------------------------------- */
@@ -37,13 +39,18 @@ static void on_sent(void *user, uint64_t n_sent, uint64_t n_total)
     struct sending *s = user;
     double now = now_s(), elapsed = now - s->started;
     char lines[1][256], note[48];
-    if (now - s->drawn < 0.1 && n_sent < n_total) return;
+    if (now - s->drawn < 0.1 && n_sent < n_total)
+        return;
     s->drawn = now;
-    struct progress_line line = {.label = s->name, .fraction = n_total ? (double)n_sent / (double)n_total : 1, .eta_s = -1, .note = note};
-    if (elapsed > 0.5 && n_sent) line.eta_s = elapsed * (double)(n_total - n_sent) / (double)n_sent;
+    struct progress_line line = {.label = s->name,
+                                 .fraction = n_total ? (double)n_sent / (double)n_total : 1,
+                                 .eta_s = -1,
+                                 .note = note};
+    if (elapsed > 0.5 && n_sent)
+        line.eta_s = elapsed * (double)(n_total - n_sent) / (double)n_sent;
     snprintf(note, sizeof note, "%.1f MB", (double)n_total * 1e-6);
     progress_bar_text(&line, progress_columns(), lines[0], sizeof lines[0]);
-    s->n_lines = progress_draw((const char (*)[256])lines, 1, s->n_lines);
+    s->n_lines = progress_draw((const char(*)[256])lines, 1, s->n_lines);
 }
 
 /* --- sending ------------------------------------------------------------------------------ */
@@ -60,7 +67,8 @@ static int open_input(const char *path, uint64_t *n_bytes)
     int fd = open(path, O_RDONLY | O_CLOEXEC);
     if (fd < 0 || fstat(fd, &status)) {
         fprintf(stderr, "groomctl: %s cannot be read: %s\n", path, strerror(errno));
-        if (fd >= 0) close(fd);
+        if (fd >= 0)
+            close(fd);
         return -1;
     }
     if (!S_ISREG(status.st_mode) || !status.st_size) {
@@ -72,38 +80,48 @@ static int open_input(const char *path, uint64_t *n_bytes)
     return fd;
 }
 
-static int send_file(struct groomctl *ctl, const char *url_path, int fd, uint64_t n_bytes, const char *name, cJSON **answer)
+static int send_file(struct groomctl *ctl, const char *url_path, int fd, uint64_t n_bytes, const char *name,
+                     cJSON **answer)
 {
     struct sending sending = {.name = name, .started = now_s()};
-    struct http_request request = {.method = "POST", .path = url_path, .content_type = "application/octet-stream",
-                                   .body_fd = fd, .n_body = n_bytes, .sent = ctl->is_terminal && !ctl->json ? on_sent : NULL,
-                                   .user = &sending, .idle_timeout_s = 300};
+    struct http_request request = {.method = "POST",
+                                   .path = url_path,
+                                   .content_type = "application/octet-stream",
+                                   .body_fd = fd,
+                                   .n_body = n_bytes,
+                                   .sent = ctl->is_terminal && !ctl->json ? on_sent : NULL,
+                                   .user = &sending,
+                                   .idle_timeout_s = 300};
     struct http_response response;
     int status = api_call(ctl, &request, &response);
-    if (sending.n_lines) progress_draw(NULL, 0, sending.n_lines);
+    if (sending.n_lines)
+        progress_draw(NULL, 0, sending.n_lines);
     *answer = status == DONE ? cJSON_ParseWithLength(response.body, response.n_body) : NULL;
     if (status == DONE && !*answer) {
         fputs("groomctl: the server's answer is not JSON; is this a groomd?\n", stderr);
         status = REFUSED;
     }
-    if (status == INTERRUPTED) fprintf(stderr, "groomctl: interrupted; nothing of %s was kept\n", name);
+    if (status == INTERRUPTED)
+        fprintf(stderr, "groomctl: interrupted; nothing of %s was kept\n", name);
     http_response_finish(&response);
     return status;
 }
 
-int upload_file(struct groomctl *ctl, enum sized_thing thing, const char *path, const struct upload_options *options,
-                cJSON **answer)
+int upload_file(struct groomctl *ctl, enum sized_thing thing, const char *path,
+                const struct upload_options *options, cJSON **answer)
 {
     struct url url;
     uint64_t n_bytes = 0;
     int fd = open_input(path, &n_bytes);
-    if (fd < 0) return REFUSED;
+    if (fd < 0)
+        return REFUSED;
     url_init(&url, thing == SIZED_HEAD ? "/v1/heads" : "/v1/strands");
     url_query(&url, "format", options->format);
     url_query(&url, "unit", options->unit);
     url_query(&url, "up", options->up);
     url_query(&url, "name", options->name ? options->name : base_name(path));
-    int status = url.overflow ? groomctl_usage_error("upload", "the name is too long") : send_file(ctl, url.text, fd, n_bytes, base_name(path), answer);
+    int status = url.overflow ? groomctl_usage_error("upload", "the name is too long")
+                              : send_file(ctl, url.text, fd, n_bytes, base_name(path), answer);
     close(fd);
     return status;
 }
@@ -113,10 +131,12 @@ int upload_file(struct groomctl *ctl, enum sized_thing thing, const char *path, 
 static int extents(const cJSON *answer, double size[3])
 {
     const cJSON *box = cJSON_GetObjectItemCaseSensitive(answer, "bbox");
-    const cJSON *low = cJSON_GetObjectItemCaseSensitive(box, "min"), *high = cJSON_GetObjectItemCaseSensitive(box, "max");
+    const cJSON *low = cJSON_GetObjectItemCaseSensitive(box, "min"),
+                *high = cJSON_GetObjectItemCaseSensitive(box, "max");
     for (int i = 0; i < 3; i++) {
         const cJSON *a = cJSON_GetArrayItem(low, i), *b = cJSON_GetArrayItem(high, i);
-        if (!cJSON_IsNumber(a) || !cJSON_IsNumber(b)) return 0;
+        if (!cJSON_IsNumber(a) || !cJSON_IsNumber(b))
+            return 0;
         size[i] = b->valuedouble - a->valuedouble;
     }
     return 1;
@@ -126,16 +146,20 @@ static void print_hint(enum sized_thing thing, const struct upload_options *opti
 {
     char text[256];
     double largest = size[0] > size[1] ? size[0] : size[1];
-    if (size[2] > largest) largest = size[2];
+    if (size[2] > largest)
+        largest = size[2];
     unit_hint_text(thing, largest, unit_in_metres(options->unit), text, sizeof text);
-    if (text[0]) fprintf(stderr, "hint: %s\n", text);
+    if (text[0])
+        fprintf(stderr, "hint: %s\n", text);
 }
 
 static void print_warnings(const cJSON *answer)
 {
     const cJSON *warning;
-    cJSON_ArrayForEach(warning, cJSON_GetObjectItemCaseSensitive(answer, "warnings")) {
-        if (cJSON_IsString(warning)) fprintf(stderr, "warning: %s\n", warning->valuestring);
+    cJSON_ArrayForEach(warning, cJSON_GetObjectItemCaseSensitive(answer, "warnings"))
+    {
+        if (cJSON_IsString(warning))
+            fprintf(stderr, "warning: %s\n", warning->valuestring);
     }
 }
 
@@ -149,13 +173,16 @@ void upload_describe(const struct groomctl *ctl, enum sized_thing thing, const s
     } else {
         printf("%s  %.0f %s, %.0f vertices, %s", api_text(answer, "id"),
                api_number(answer, thing == SIZED_HEAD ? "triangles" : "strands", 0),
-               thing == SIZED_HEAD ? "triangles" : "strands", api_number(answer, "vertices", 0), api_text(answer, "format"));
-        if (known) printf(", %.3g x %.3g x %.3g m", size[0], size[1], size[2]);
+               thing == SIZED_HEAD ? "triangles" : "strands", api_number(answer, "vertices", 0),
+               api_text(answer, "format"));
+        if (known)
+            printf(", %.3g x %.3g x %.3g m", size[0], size[1], size[2]);
         printf("\n");
         fflush(stdout);
     }
     print_warnings(answer);
-    if (known) print_hint(thing, options, size);
+    if (known)
+        print_hint(thing, options, size);
 }
 
 static int upload(struct groomctl *ctl, const struct arguments *arguments, enum sized_thing thing)
@@ -163,7 +190,8 @@ static int upload(struct groomctl *ctl, const struct arguments *arguments, enum 
     struct upload_options options = upload_options_of(arguments);
     cJSON *answer = NULL;
     int status = upload_file(ctl, thing, arguments->operands[0], &options, &answer);
-    if (status == DONE) upload_describe(ctl, thing, &options, answer);
+    if (status == DONE)
+        upload_describe(ctl, thing, &options, answer);
     cJSON_Delete(answer);
     return status;
 }

@@ -8,8 +8,9 @@ static void print_options(FILE *out, const struct option_spec *table)
 {
     for (; table && table->name; table++) {
         char left[48];
-        snprintf(left, sizeof left, "%c%c%c --%s%s%s", table->letter ? '-' : ' ', table->letter ? table->letter : ' ',
-                 table->letter ? ',' : ' ', table->name, table->value ? " " : "", table->value ? table->value : "");
+        snprintf(left, sizeof left, "%c%c%c --%s%s%s", table->letter ? '-' : ' ',
+                 table->letter ? table->letter : ' ', table->letter ? ',' : ' ', table->name,
+                 table->value ? " " : "", table->value ? table->value : "");
         fprintf(out, "  %-28s  %s\n", left, table->help);
     }
 }
@@ -26,14 +27,16 @@ void usage_print(FILE *out)
     print_options(out, groomctl_global_options);
     fputs("\n`groomctl COMMAND --help` lists a command's own. From a file to a groom in one line:\n"
           "  groomctl fit hair.data --unit cm --head-file body.obj -o out.usda\n"
-          "exit status: 0 done, 1 refused or failed, 2 wrong usage, 130 interrupted\n", out);
+          "exit status: 0 done, 1 refused or failed, 2 wrong usage, 130 interrupted\n",
+          out);
 }
 
 void usage_print_command(FILE *out, const struct command *command)
 {
-    fprintf(out, "usage: groomctl %s%s%s%s\n%s\n", command->name, command->operands[0] ? " " : "", command->operands,
-            command->options ? " [options]" : "", command->summary);
-    if (command->options) fputs("\n", out);
+    fprintf(out, "usage: groomctl %s%s%s%s\n%s\n", command->name, command->operands[0] ? " " : "",
+            command->operands, command->options ? " [options]" : "", command->summary);
+    if (command->options)
+        fputs("\n", out);
     print_options(out, command->options);
     fputs("\noptions of every command:\n", out);
     print_options(out, groomctl_global_options);

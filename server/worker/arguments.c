@@ -12,12 +12,15 @@ unsigned worker_threads(void)
     return n <= 1024 ? (unsigned)n : 1024;
 }
 
-groom_status worker_frame_parse(const char *unit, const char *up, struct groom_frame *frame, struct groom_diag *diag)
+groom_status worker_frame_parse(const char *unit, const char *up, struct groom_frame *frame,
+                                struct groom_diag *diag)
 {
     groom_status st = GROOM_OK;
     *frame = (struct groom_frame){.unit_m = 1, .up = GROOM_UP_Y};
-    if (unit) st = groom_unit_parse(unit, &frame->unit_m, diag);
-    if (st == GROOM_OK && up) st = groom_up_parse(up, &frame->up, diag);
+    if (unit)
+        st = groom_unit_parse(unit, &frame->unit_m, diag);
+    if (st == GROOM_OK && up)
+        st = groom_up_parse(up, &frame->up, diag);
     return st;
 }
 
@@ -26,11 +29,12 @@ groom_status worker_count_parse(const char *option, const char *text, unsigned l
 {
     char *end;
     *value = 0;
-    if (!text) return GROOM_OK;
+    if (!text)
+        return GROOM_OK;
     errno = 0;
     *value = strtoull(text, &end, 10);
     if (errno || end == text || *end || text[0] == '-' || *value > maximum)
-        return groom_fail(diag, GROOM_EINVAL, "%s is \"%.40s\"; it must be a whole number up to %llu", option, text,
-                          maximum);
+        return groom_fail(diag, GROOM_EINVAL, "%s is \"%.40s\"; it must be a whole number up to %llu", option,
+                          text, maximum);
     return GROOM_OK;
 }

@@ -18,10 +18,7 @@
 
 static volatile sig_atomic_t stop;
 
-static void on_signal(int number)
-{
-    stop = number;
-}
+static void on_signal(int number) { stop = number; }
 
 struct attempt {
     struct work_link link;
@@ -40,11 +37,14 @@ struct attempt {
 static groom_status take_order(struct attempt *a)
 {
     struct http_response response;
-    groom_status st = work_link_call(&a->link, &(struct http_request){.method = "GET", .path = WORK_PATH_JOB}, &response, &a->diag);
-    if (st == GROOM_OK) st = order_parse(response.body, response.n_body, &a->order, &a->diag);
+    groom_status st = work_link_call(&a->link, &(struct http_request){.method = "GET", .path = WORK_PATH_JOB},
+                                     &response, &a->diag);
+    if (st == GROOM_OK)
+        st = order_parse(response.body, response.n_body, &a->order, &a->diag);
     http_response_finish(&response);
     if (st == GROOM_OK && strcmp(a->order.kind, "fit"))
-        st = groom_fail_field(&a->diag, GROOM_EINVAL, "/kind", "this worker runs jobs of kind \"fit\", not \"%.15s\"", a->order.kind);
+        st = groom_fail_field(&a->diag, GROOM_EINVAL, "/kind",
+                              "this worker runs jobs of kind \"fit\", not \"%.15s\"", a->order.kind);
     return st;
 }
 
@@ -54,8 +54,10 @@ static groom_status read_strands(struct attempt *a, const struct blob *blob)
     struct groom_source source = groom_source_from_memory(&memory, blob->bytes, blob->n_bytes);
     struct groom_read_options options = {.frame = a->order.strands.frame};
     groom_status st = GROOM_OK;
-    if (a->order.strands.format[0]) st = groom_format_parse(a->order.strands.format, &options.format, &a->diag);
-    if (st == GROOM_OK) st = groom_strands_read(&source, &options, &a->context, &a->strands, NULL, &a->diag);
+    if (a->order.strands.format[0])
+        st = groom_format_parse(a->order.strands.format, &options.format, &a->diag);
+    if (st == GROOM_OK)
+        st = groom_strands_read(&source, &options, &a->context, &a->strands, NULL, &a->diag);
     return st;
 }
 
@@ -65,8 +67,10 @@ static groom_status read_head(struct attempt *a, const struct blob *blob)
     struct groom_source source = groom_source_from_memory(&memory, blob->bytes, blob->n_bytes);
     struct groom_mesh_read_options options = {.frame = a->order.head.frame};
     groom_status st = GROOM_OK;
-    if (a->order.head.format[0]) st = groom_mesh_format_parse(a->order.head.format, &options.format, &a->diag);
-    if (st == GROOM_OK) st = groom_mesh_read(&source, &options, &a->context, &a->head, NULL, &a->diag);
+    if (a->order.head.format[0])
+        st = groom_mesh_format_parse(a->order.head.format, &options.format, &a->diag);
+    if (st == GROOM_OK)
+        st = groom_mesh_read(&source, &options, &a->context, &a->head, NULL, &a->diag);
     return st;
 }
 
@@ -74,9 +78,11 @@ static groom_status take_input(struct attempt *a, const struct order_input *inpu
                                groom_status (*read)(struct attempt *a, const struct blob *blob))
 {
     struct blob blob;
-    if (!input->blob.sha256[0]) return GROOM_OK;
+    if (!input->blob.sha256[0])
+        return GROOM_OK;
     groom_status st = blob_fetch(&a->link, &input->blob, &blob, &a->diag);
-    if (st != GROOM_OK) return st;
+    if (st != GROOM_OK)
+        return st;
     st = read(a, &blob);
     blob_release(&blob);
     return st;
@@ -86,9 +92,11 @@ static groom_status make_fit(struct attempt *a)
 {
     struct groom_fit_options *options = malloc(sizeof *options);
     groom_status st;
-    if (!options) return groom_fail(&a->diag, GROOM_ENOMEM, "no memory for the options");
+    if (!options)
+        return groom_fail(&a->diag, GROOM_ENOMEM, "no memory for the options");
     st = groom_fit_options_parse(a->order.options, strlen(a->order.options), options, &a->diag);
-    if (st == GROOM_OK) st = groom_fit_create(a->strands, a->head, options, &a->context, &a->fit, &a->diag);
+    if (st == GROOM_OK)
+        st = groom_fit_create(a->strands, a->head, options, &a->context, &a->fit, &a->diag);
     free(options);
     groom_strands_destroy(a->strands);
     a->strands = NULL;
@@ -100,8 +108,10 @@ static groom_status take_up(struct attempt *a)
     groom_status st = GROOM_OK;
     if (a->order.checkpoint.sha256[0])
         st = checkpoints_load(a->fit, &a->order.checkpoint, &a->link, &a->context, &a->diag);
-    if (st == GROOM_OK) checkpoints_init(&a->checkpoints, a->fit);
-    if (st == GROOM_OK) progress_report_follow(&a->report, a->fit);
+    if (st == GROOM_OK)
+        checkpoints_init(&a->checkpoints, a->fit);
+    if (st == GROOM_OK)
+        progress_report_follow(&a->report, a->fit);
     return st;
 }
 
@@ -112,7 +122,8 @@ static groom_status save(struct attempt *a)
 {
     struct groom_diag diag = {0};
     groom_status st = checkpoints_save(&a->checkpoints, a->fit, 0, &a->link, &diag);
-    if (st == GROOM_OK || st == GROOM_ECANCELLED) return st;
+    if (st == GROOM_OK || st == GROOM_ECANCELLED)
+        return st;
     fprintf(stderr, "groom-worker: warning: a checkpoint was not taken: %s\n", diag.detail);
     return GROOM_OK;
 }
@@ -123,8 +134,10 @@ static groom_status work(struct attempt *a)
     while (st == GROOM_OK && !groom_fit_done(a->fit)) {
         uint32_t stage = checkpoints_stage(a->fit);
         st = groom_fit_step(a->fit, &a->context, &a->diag);
-        if (st == GROOM_OK) st = save(a);
-        if (st == GROOM_OK) st = progress_report_send(&a->report, checkpoints_stage(a->fit) != stage);
+        if (st == GROOM_OK)
+            st = save(a);
+        if (st == GROOM_OK)
+            st = progress_report_send(&a->report, checkpoints_stage(a->fit) != stage);
     }
     return st;
 }
@@ -136,11 +149,14 @@ static char *surroundings(const struct attempt *a, const char *fit_report)
     cJSON_AddStringToObject(around, "name", a->order.strands.name);
     source = cJSON_AddObjectToObject(around, "source");
     cJSON_AddStringToObject(source, "strands", a->order.strands.id);
-    if (a->order.head.id[0]) cJSON_AddStringToObject(source, "head", a->order.head.id);
-    else cJSON_AddNullToObject(source, "head");
+    if (a->order.head.id[0])
+        cJSON_AddStringToObject(source, "head", a->order.head.id);
+    else
+        cJSON_AddNullToObject(source, "head");
     cJSON_AddStringToObject(source, "job", a->order.job);
     fit = cJSON_Parse(fit_report);
-    if (!fit) fit = cJSON_CreateObject();
+    if (!fit)
+        fit = cJSON_CreateObject();
     cJSON_AddItemToObject(fit, "options", cJSON_Parse(a->order.options));
     cJSON_AddItemToObject(around, "fit", fit);
     char *text = cJSON_PrintUnformatted(around);
@@ -153,7 +169,8 @@ static groom_status write_result(struct attempt *a, char **json, size_t *n_bytes
     struct groom *groom = NULL;
     char *report = NULL, *around = NULL;
     groom_status st = groom_fit_report_print(a->fit, &report, &a->diag);
-    if (st == GROOM_OK) st = groom_fit_result(a->fit, &a->context, &groom, &a->diag);
+    if (st == GROOM_OK)
+        st = groom_fit_result(a->fit, &a->context, &groom, &a->diag);
     if (st == GROOM_OK) {
         snprintf(groom->name, sizeof groom->name, "%s", a->order.strands.name);
         around = surroundings(a, report);
@@ -170,10 +187,16 @@ static groom_status deliver(struct attempt *a)
     char *json = NULL;
     size_t n_bytes = 0;
     groom_status st = progress_report_send(&a->report, 1);
-    if (st == GROOM_OK) st = write_result(a, &json, &n_bytes);
     if (st == GROOM_OK)
-        st = work_link_call(&a->link, &(struct http_request){.method = "POST", .path = WORK_PATH_RESULT,
-                            .content_type = "application/json", .body = json, .n_body = n_bytes}, NULL, &a->diag);
+        st = write_result(a, &json, &n_bytes);
+    if (st == GROOM_OK)
+        st = work_link_call(&a->link,
+                            &(struct http_request){.method = "POST",
+                                                   .path = WORK_PATH_RESULT,
+                                                   .content_type = "application/json",
+                                                   .body = json,
+                                                   .n_body = n_bytes},
+                            NULL, &a->diag);
     free(json);
     return st;
 }
@@ -194,8 +217,11 @@ static int leave(struct attempt *a)
 static int fail(struct attempt *a, groom_status status)
 {
     char *text = worker_problem_text(status, &a->diag);
-    struct http_request request = {.method = "POST", .path = WORK_PATH_FAILED, .content_type = "application/json",
-                                   .body = text, .n_body = text ? strlen(text) : 0};
+    struct http_request request = {.method = "POST",
+                                   .path = WORK_PATH_FAILED,
+                                   .content_type = "application/json",
+                                   .body = text,
+                                   .n_body = text ? strlen(text) : 0};
     fprintf(stderr, "groom-worker: failed: %s\n", text ? text : groom_status_message(status));
     groom_status st = text ? work_link_call(&a->link, &request, NULL, NULL) : GROOM_ENOMEM;
     free(text);
@@ -217,12 +243,18 @@ static void release(struct attempt *a)
 static groom_status run(struct attempt *a)
 {
     groom_status st = take_order(a);
-    if (st == GROOM_OK) st = take_input(a, &a->order.strands, read_strands);
-    if (st == GROOM_OK) st = take_input(a, &a->order.head, read_head);
-    if (st == GROOM_OK) st = make_fit(a);
-    if (st == GROOM_OK) st = take_up(a);
-    if (st == GROOM_OK) st = work(a);
-    if (st == GROOM_OK) st = deliver(a);
+    if (st == GROOM_OK)
+        st = take_input(a, &a->order.strands, read_strands);
+    if (st == GROOM_OK)
+        st = take_input(a, &a->order.head, read_head);
+    if (st == GROOM_OK)
+        st = make_fit(a);
+    if (st == GROOM_OK)
+        st = take_up(a);
+    if (st == GROOM_OK)
+        st = work(a);
+    if (st == GROOM_OK)
+        st = deliver(a);
     return st;
 }
 
@@ -236,7 +268,8 @@ static int attempt(const char *url, const char *token)
     progress_report_init(&a->report, &a->link);
     a->context.progress = &a->report.callbacks;
     groom_status st = groom_pool_create(worker_threads(), &a->context.pool);
-    if (st == GROOM_OK) st = run(a);
+    if (st == GROOM_OK)
+        st = run(a);
     int status = st == GROOM_OK ? WORK_EXIT_DONE : st == GROOM_ECANCELLED ? leave(a) : fail(a, st);
     release(a);
     return status;
@@ -248,7 +281,8 @@ int worker_attempt(int argc, char **argv)
     struct sigaction action = {.sa_handler = on_signal};
     if (argc != 1 || !url || !token) {
         fputs("groom-worker attempt: takes no argument; " WORK_ENV_URL " and " WORK_ENV_TOKEN
-              " name the work. groomd starts it.\n", stderr);
+              " name the work. groomd starts it.\n",
+              stderr);
         return WORK_EXIT_USAGE;
     }
     sigaction(SIGTERM, &action, NULL);

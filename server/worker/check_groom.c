@@ -9,15 +9,18 @@
 /* 200 000 strands with everything that a groom may hold are some 80 MB of JSON. */
 #define MAX_DOCUMENT ((size_t)1 << 30)
 
-static groom_status check(struct worker_input *input, const struct groom_context *context, struct groom_diag *diag)
+static groom_status check(struct worker_input *input, const struct groom_context *context,
+                          struct groom_diag *diag)
 {
     static const int output = STDOUT_FILENO;
     char *text = NULL, *canonical = NULL;
     size_t n = 0, n_canonical = 0;
     struct groom *groom = NULL;
     groom_status st = worker_input_text(input, MAX_DOCUMENT, &text, &n, diag);
-    if (st == GROOM_OK) st = groom_document_read(text, n, NULL, context, &groom, diag);
-    if (st == GROOM_OK) st = groom_document_write(groom, text, NULL, &canonical, &n_canonical, diag);
+    if (st == GROOM_OK)
+        st = groom_document_read(text, n, NULL, context, &groom, diag);
+    if (st == GROOM_OK)
+        st = groom_document_write(groom, text, NULL, &canonical, &n_canonical, diag);
     if (st == GROOM_OK) {
         struct groom_sink sink = worker_fd_sink(&output);
         st = sink.write(sink.user, canonical, n_canonical);
@@ -40,7 +43,8 @@ int worker_check_groom(int argc, char **argv)
     worker_enter_sandbox();
     worker_input_open(STDIN_FILENO, &input);
     groom_status st = groom_pool_create(worker_threads(), &context.pool);
-    if (st == GROOM_OK) st = check(&input, &context, &diag);
+    if (st == GROOM_OK)
+        st = check(&input, &context, &diag);
     groom_pool_destroy(context.pool);
     worker_input_close(&input);
     return st == GROOM_OK ? WORKER_OK : worker_print_problem(st, &diag);

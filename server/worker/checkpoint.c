@@ -35,7 +35,8 @@ static groom_status collect(void *user, const void *bytes, size_t n_bytes)
     if (c->n_bytes + n_bytes > c->capacity) {
         size_t capacity = 2 * (c->n_bytes + n_bytes);
         unsigned char *more = realloc(c->bytes, capacity);
-        if (!more) return GROOM_ENOMEM;
+        if (!more)
+            return GROOM_ENOMEM;
         c->bytes = more;
         c->capacity = capacity;
     }
@@ -44,11 +45,15 @@ static groom_status collect(void *user, const void *bytes, size_t n_bytes)
     return GROOM_OK;
 }
 
-static groom_status put(struct checkpoints *c, uint32_t stage, struct work_link *link, struct groom_diag *diag)
+static groom_status put(struct checkpoints *c, uint32_t stage, struct work_link *link,
+                        struct groom_diag *diag)
 {
     char path[sizeof WORK_PATH_CHECKPOINT + 24];
-    struct http_request request = {.method = "PUT", .path = path, .content_type = "application/octet-stream",
-                                   .body = c->bytes, .n_body = c->n_bytes};
+    struct http_request request = {.method = "PUT",
+                                   .path = path,
+                                   .content_type = "application/octet-stream",
+                                   .body = c->bytes,
+                                   .n_body = c->n_bytes};
     snprintf(path, sizeof path, "%s?stage=%u", WORK_PATH_CHECKPOINT, stage);
     return work_link_call(link, &request, NULL, diag);
 }
@@ -57,10 +62,12 @@ groom_status checkpoints_save(struct checkpoints *checkpoints, const struct groo
                               struct work_link *link, struct groom_diag *diag)
 {
     uint32_t stage = checkpoints_stage(fit);
-    if (!now && stage == checkpoints->stage && clock_s() - checkpoints->saved_at_s < INTERVAL_S) return GROOM_OK;
+    if (!now && stage == checkpoints->stage && clock_s() - checkpoints->saved_at_s < INTERVAL_S)
+        return GROOM_OK;
     checkpoints->n_bytes = 0;
     groom_status st = groom_fit_save(fit, (struct groom_sink){.write = collect, .user = checkpoints}, diag);
-    if (st == GROOM_OK) st = put(checkpoints, stage, link, diag);
+    if (st == GROOM_OK)
+        st = put(checkpoints, stage, link, diag);
     checkpoints->stage = stage;
     checkpoints->saved_at_s = clock_s();
     return st;
@@ -78,8 +85,11 @@ groom_status checkpoints_load(struct groom_fit *fit, const struct order_blob *na
         st = groom_fit_load(fit, &source, context, &reason);
     }
     blob_release(&blob);
-    if (st == GROOM_OK || st == GROOM_ECANCELLED) return st;
-    if (st == GROOM_ENOMEM) return groom_fail(diag, st, "no memory for the checkpoint");
-    fprintf(stderr, "groom-worker: warning: the checkpoint is not used, the job starts anew: %s\n", reason.detail);
+    if (st == GROOM_OK || st == GROOM_ECANCELLED)
+        return st;
+    if (st == GROOM_ENOMEM)
+        return groom_fail(diag, st, "no memory for the checkpoint");
+    fprintf(stderr, "groom-worker: warning: the checkpoint is not used, the job starts anew: %s\n",
+            reason.detail);
     return GROOM_OK;
 }

@@ -25,18 +25,36 @@ static int parse(int argc, char **argv, struct request *request)
     int c;
     while ((c = getopt_long(argc, argv, "", options, NULL)) != -1) {
         switch (c) {
-        case 'f': request->from_format = *optarg && strcmp(optarg, "auto") ? optarg : NULL; break;
-        case 'u': request->from_unit = optarg; break;
-        case 'a': request->from_up = optarg; break;
-        case 'F': request->to_format = optarg; break;
-        case 'U': request->unit = optarg; break;
-        case 'A': request->up = optarg; break;
-        case 'm': request->vertices = optarg; break;
-        case 'n': request->count = optarg; break;
-        default: return 0;
+        case 'f':
+            request->from_format = *optarg && strcmp(optarg, "auto") ? optarg : NULL;
+            break;
+        case 'u':
+            request->from_unit = optarg;
+            break;
+        case 'a':
+            request->from_up = optarg;
+            break;
+        case 'F':
+            request->to_format = optarg;
+            break;
+        case 'U':
+            request->unit = optarg;
+            break;
+        case 'A':
+            request->up = optarg;
+            break;
+        case 'm':
+            request->vertices = optarg;
+            break;
+        case 'n':
+            request->count = optarg;
+            break;
+        default:
+            return 0;
         }
     }
-    if (optind == argc && request->to_format) return 1;
+    if (optind == argc && request->to_format)
+        return 1;
     fputs("groom-worker convert: --to-format is needed, and no other argument\n", stderr);
     return 0;
 }
@@ -44,27 +62,32 @@ static int parse(int argc, char **argv, struct request *request)
 static groom_status interpret(struct request *request, struct groom_diag *diag)
 {
     groom_status st = GROOM_OK;
-    if (request->from_format) st = groom_format_parse(request->from_format, &request->read.format, diag);
-    if (st == GROOM_OK) st = groom_format_parse(request->to_format, &request->write.format, diag);
+    if (request->from_format)
+        st = groom_format_parse(request->from_format, &request->read.format, diag);
+    if (st == GROOM_OK)
+        st = groom_format_parse(request->to_format, &request->write.format, diag);
     if (st == GROOM_OK && !groom_format_writable(request->write.format))
-        st = groom_fail(diag, GROOM_EINVAL, "format \"%s\" can be read but not written; take hair, usda, ply, obj, data or json",
+        st = groom_fail(diag, GROOM_EINVAL,
+                        "format \"%s\" can be read but not written; take hair, usda, ply, obj, data or json",
                         groom_format_name(request->write.format));
-    if (st == GROOM_OK) st = worker_frame_parse(request->from_unit, request->from_up, &request->read.frame, diag);
-    if (st == GROOM_OK) st = worker_frame_parse(request->unit, request->up, &request->write.frame, diag);
-    if (st == GROOM_OK) st = worker_count_parse("--vertices", request->vertices, 65536, &request->n_vertices, diag);
-    if (st == GROOM_OK) st = worker_count_parse("--count", request->count, UINT32_MAX, &request->n_count, diag);
+    if (st == GROOM_OK)
+        st = worker_frame_parse(request->from_unit, request->from_up, &request->read.frame, diag);
+    if (st == GROOM_OK)
+        st = worker_frame_parse(request->unit, request->up, &request->write.frame, diag);
+    if (st == GROOM_OK)
+        st = worker_count_parse("--vertices", request->vertices, 65536, &request->n_vertices, diag);
+    if (st == GROOM_OK)
+        st = worker_count_parse("--count", request->count, UINT32_MAX, &request->n_count, diag);
     if (st == GROOM_OK && request->vertices && request->n_vertices < 2)
-        st = groom_fail(diag, GROOM_EINVAL, "--vertices is %llu; a strand has at least 2", request->n_vertices);
+        st = groom_fail(diag, GROOM_EINVAL, "--vertices is %llu; a strand has at least 2",
+                        request->n_vertices);
     if (st == GROOM_OK && request->count && !request->n_count)
         st = groom_fail(diag, GROOM_EINVAL, "--count is 0; at least one strand must be left");
     return st;
 }
 
 /* Strand i of `count` is strand i * n / count: spread over the file, the same for every call. */
-static uint32_t chosen(uint32_t i, uint32_t n, uint32_t count)
-{
-    return (uint32_t)((uint64_t)i * n / count);
-}
+static uint32_t chosen(uint32_t i, uint32_t n, uint32_t count) { return (uint32_t)((uint64_t)i * n / count); }
 
 static groom_status thin(struct groom_strands **strands, uint32_t count, const struct groom_context *context,
                          struct groom_diag *diag)
@@ -77,7 +100,8 @@ static groom_status thin(struct groom_strands **strands, uint32_t count, const s
         n_vertices += all->first[s + 1] - all->first[s];
     }
     groom_status st = groom_strands_create(count, n_vertices, context, &few, diag);
-    if (st != GROOM_OK) return st;
+    if (st != GROOM_OK)
+        return st;
     for (uint32_t i = 0; i < count; i++) {
         uint32_t s = chosen(i, all->n_strands, count), n = all->first[s + 1] - all->first[s];
         few->first[i + 1] = few->first[i] + n;
@@ -88,14 +112,16 @@ static groom_status thin(struct groom_strands **strands, uint32_t count, const s
     return GROOM_OK;
 }
 
-static groom_status resample(struct groom_strands **strands, uint32_t n_vertices, const struct groom_context *context,
-                             struct groom_diag *diag)
+static groom_status resample(struct groom_strands **strands, uint32_t n_vertices,
+                             const struct groom_context *context, struct groom_diag *diag)
 {
     struct groom_strands *even = NULL;
     uint32_t n = (*strands)->n_strands;
     groom_status st = groom_strands_create(n, (uint64_t)n * n_vertices, context, &even, diag);
-    if (st != GROOM_OK) return st;
-    for (uint32_t i = 0; i < n; i++) even->first[i + 1] = (i + 1) * n_vertices;
+    if (st != GROOM_OK)
+        return st;
+    for (uint32_t i = 0; i < n; i++)
+        even->first[i + 1] = (i + 1) * n_vertices;
     st = groom_strands_resample(*strands, n_vertices, even->points, context, diag);
     if (st == GROOM_OK) {
         struct groom_strands *uneven = *strands;
@@ -106,16 +132,18 @@ static groom_status resample(struct groom_strands **strands, uint32_t n_vertices
     return st;
 }
 
-static groom_status convert(struct request *request, struct worker_input *input, const struct groom_context *context,
-                            struct groom_diag *diag)
+static groom_status convert(struct request *request, struct worker_input *input,
+                            const struct groom_context *context, struct groom_diag *diag)
 {
     static const int output = STDOUT_FILENO;
     struct groom_strands *strands = NULL;
     groom_status st = groom_strands_read(&input->source, &request->read, context, &strands, NULL, diag);
     if (st == GROOM_OK && request->n_count && request->n_count < strands->n_strands)
         st = thin(&strands, (uint32_t)request->n_count, context, diag);
-    if (st == GROOM_OK && request->n_vertices) st = resample(&strands, (uint32_t)request->n_vertices, context, diag);
-    if (st == GROOM_OK) st = groom_strands_write(strands, &request->write, worker_fd_sink(&output), context, diag);
+    if (st == GROOM_OK && request->n_vertices)
+        st = resample(&strands, (uint32_t)request->n_vertices, context, diag);
+    if (st == GROOM_OK)
+        st = groom_strands_write(strands, &request->write, worker_fd_sink(&output), context, diag);
     groom_strands_destroy(strands);
     return st;
 }
@@ -126,12 +154,15 @@ int worker_convert(int argc, char **argv)
     struct groom_context context = {0};
     struct worker_input input;
     struct groom_diag diag = {0};
-    if (!parse(argc, argv, &request)) return WORKER_USAGE;
+    if (!parse(argc, argv, &request))
+        return WORKER_USAGE;
     worker_enter_sandbox();
     worker_input_open(STDIN_FILENO, &input);
     groom_status st = groom_pool_create(worker_threads(), &context.pool);
-    if (st == GROOM_OK) st = interpret(&request, &diag);
-    if (st == GROOM_OK) st = convert(&request, &input, &context, &diag);
+    if (st == GROOM_OK)
+        st = interpret(&request, &diag);
+    if (st == GROOM_OK)
+        st = convert(&request, &input, &context, &diag);
     groom_pool_destroy(context.pool);
     worker_input_close(&input);
     return st == GROOM_OK ? WORKER_OK : worker_print_problem(st, &diag);

@@ -13,7 +13,8 @@ void worker_input_open(int fd, struct worker_input *input)
     struct stat status;
     memset(input, 0, sizeof *input);
     input->source = groom_source_from_fd(fd);
-    if (fstat(fd, &status) || !S_ISREG(status.st_mode) || status.st_size <= 0 || lseek(fd, 0, SEEK_CUR) != 0) return;
+    if (fstat(fd, &status) || !S_ISREG(status.st_mode) || status.st_size <= 0 || lseek(fd, 0, SEEK_CUR) != 0)
+        return;
     input->map = mmap(NULL, (size_t)status.st_size, PROT_READ, MAP_PRIVATE, fd, 0);
     if (input->map == MAP_FAILED) {
         input->map = NULL;
@@ -26,7 +27,8 @@ void worker_input_open(int fd, struct worker_input *input)
 
 void worker_input_close(struct worker_input *input)
 {
-    if (input->map) munmap(input->map, input->n_map);
+    if (input->map)
+        munmap(input->map, input->n_map);
     memset(input, 0, sizeof *input);
 }
 
@@ -39,16 +41,20 @@ groom_status worker_input_text(struct worker_input *input, size_t limit, char **
     while (bytes && got > 0 && n <= limit) {
         if (n + 1 >= capacity) {
             char *more = realloc(bytes, capacity *= 2);
-            if (!more) break;
+            if (!more)
+                break;
             bytes = more;
         }
         got = input->source.read(input->source.user, bytes + n, capacity - 1 - n);
-        if (got > 0) n += (size_t)got;
+        if (got > 0)
+            n += (size_t)got;
     }
     if (!bytes || got != 0) {
         free(bytes);
-        if (n > limit) return groom_fail(diag, GROOM_ETOOBIG, "the document is longer than %zu bytes", limit);
-        if (got < 0) return groom_fail(diag, GROOM_EIO, "standard input cannot be read: %s", strerror(errno));
+        if (n > limit)
+            return groom_fail(diag, GROOM_ETOOBIG, "the document is longer than %zu bytes", limit);
+        if (got < 0)
+            return groom_fail(diag, GROOM_EIO, "standard input cannot be read: %s", strerror(errno));
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the document");
     }
     bytes[n] = '\0';
@@ -63,8 +69,12 @@ static groom_status write_all(void *user, const void *bytes, size_t n_bytes)
     int fd = *(const int *)user;
     while (n_bytes) {
         ssize_t n = write(fd, at, n_bytes);
-        if (n < 0 && errno == EINTR) continue;
-        if (n < 0) return errno == EPIPE ? GROOM_ECANCELLED : errno == ENOSPC || errno == EFBIG ? GROOM_ENOSPC : GROOM_EIO;
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n < 0)
+            return errno == EPIPE                      ? GROOM_ECANCELLED
+                   : errno == ENOSPC || errno == EFBIG ? GROOM_ENOSPC
+                                                       : GROOM_EIO;
         at += n;
         n_bytes -= (size_t)n;
     }

@@ -39,14 +39,16 @@ static void add_box(cJSON *object, const float minimum[3], const float maximum[3
 static void add_warnings(cJSON *object, uint32_t n, const char (*warnings)[160])
 {
     cJSON *array = cJSON_AddArrayToObject(object, "warnings");
-    for (uint32_t i = 0; i < n; i++) cJSON_AddItemToArray(array, cJSON_CreateString(warnings[i]));
+    for (uint32_t i = 0; i < n; i++)
+        cJSON_AddItemToArray(array, cJSON_CreateString(warnings[i]));
 }
 
 static groom_status print_object(cJSON *object, struct groom_diag *diag)
 {
     char *text = cJSON_PrintUnformatted(object);
     cJSON_Delete(object);
-    if (!text) return groom_fail(diag, GROOM_ENOMEM, "no memory for the answer");
+    if (!text)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for the answer");
     puts(text);
     free(text);
     return GROOM_OK;
@@ -54,7 +56,8 @@ static groom_status print_object(cJSON *object, struct groom_diag *diag)
 
 /* --- strands ----------------------------------------------------------------------- */
 
-static cJSON *describe_strands(const struct groom_strands_summary *summary, const struct groom_read_report *report)
+static cJSON *describe_strands(const struct groom_strands_summary *summary,
+                               const struct groom_read_report *report)
 {
     cJSON *object = cJSON_CreateObject(), *length, *dropped;
     cJSON_AddStringToObject(object, "format", groom_format_name(report->format));
@@ -69,7 +72,7 @@ static cJSON *describe_strands(const struct groom_strands_summary *summary, cons
     cJSON_AddNumberToObject(dropped, "short", (double)report->n_dropped_short);
     cJSON_AddNumberToObject(dropped, "zero_length", (double)report->n_dropped_zero_length);
     cJSON_AddNumberToObject(dropped, "not_finite", (double)report->n_dropped_not_finite);
-    add_warnings(object, report->n_warnings, (const char (*)[160])report->warnings);
+    add_warnings(object, report->n_warnings, (const char(*)[160])report->warnings);
     return object;
 }
 
@@ -81,10 +84,14 @@ static groom_status inspect_strands(const struct request *request, struct worker
     struct groom_read_report report;
     struct groom_strands_summary summary;
     groom_status st = GROOM_OK;
-    if (request->format) st = groom_format_parse(request->format, &options.format, diag);
-    if (st == GROOM_OK) st = groom_strands_read(&input->source, &options, context, &strands, &report, diag);
-    if (st == GROOM_OK) st = groom_strands_summarize(strands, context, &summary, diag);
-    if (st == GROOM_OK) st = print_object(describe_strands(&summary, &report), diag);
+    if (request->format)
+        st = groom_format_parse(request->format, &options.format, diag);
+    if (st == GROOM_OK)
+        st = groom_strands_read(&input->source, &options, context, &strands, &report, diag);
+    if (st == GROOM_OK)
+        st = groom_strands_summarize(strands, context, &summary, diag);
+    if (st == GROOM_OK)
+        st = print_object(describe_strands(&summary, &report), diag);
     groom_strands_destroy(strands);
     return st;
 }
@@ -104,7 +111,7 @@ static cJSON *describe_head(const struct groom_mesh *mesh, const struct groom_me
     dropped = cJSON_AddObjectToObject(object, "dropped");
     cJSON_AddNumberToObject(dropped, "not_finite", (double)report->n_dropped_not_finite);
     cJSON_AddNumberToObject(dropped, "degenerate", (double)report->n_dropped_degenerate);
-    add_warnings(object, report->n_warnings, (const char (*)[160])report->warnings);
+    add_warnings(object, report->n_warnings, (const char(*)[160])report->warnings);
     return object;
 }
 
@@ -115,12 +122,15 @@ static groom_status inspect_head(const struct request *request, struct worker_in
     struct groom_mesh *mesh = NULL;
     struct groom_mesh_read_report report;
     groom_status st = GROOM_OK;
-    if (request->format) st = groom_mesh_format_parse(request->format, &options.format, diag);
-    if (st == GROOM_OK) st = groom_mesh_read(&input->source, &options, context, &mesh, &report, diag);
+    if (request->format)
+        st = groom_mesh_format_parse(request->format, &options.format, diag);
+    if (st == GROOM_OK)
+        st = groom_mesh_read(&input->source, &options, context, &mesh, &report, diag);
     if (st == GROOM_OK && request->n_max && mesh->n_vertices > request->n_max)
-        st = groom_fail(diag, GROOM_ETOOBIG, "the mesh has %u vertices; at most %llu are taken", mesh->n_vertices,
-                        request->n_max);
-    if (st == GROOM_OK) st = print_object(describe_head(mesh, &report), diag);
+        st = groom_fail(diag, GROOM_ETOOBIG, "the mesh has %u vertices; at most %llu are taken",
+                        mesh->n_vertices, request->n_max);
+    if (st == GROOM_OK)
+        st = print_object(describe_head(mesh, &report), diag);
     groom_mesh_destroy(mesh);
     return st;
 }
@@ -129,30 +139,46 @@ static groom_status inspect_head(const struct request *request, struct worker_in
 
 static int parse(int argc, char **argv, struct request *request)
 {
-    static const struct option options[] = {{"kind", 1, NULL, 'k'}, {"format", 1, NULL, 'f'}, {"unit", 1, NULL, 'u'},
-                                            {"up", 1, NULL, 'a'}, {"max-vertices", 1, NULL, 'n'}, {NULL, 0, NULL, 0}};
+    static const struct option options[] = {{"kind", 1, NULL, 'k'},         {"format", 1, NULL, 'f'},
+                                            {"unit", 1, NULL, 'u'},         {"up", 1, NULL, 'a'},
+                                            {"max-vertices", 1, NULL, 'n'}, {NULL, 0, NULL, 0}};
     int c;
     while ((c = getopt_long(argc, argv, "", options, NULL)) != -1) {
         switch (c) {
-        case 'k': request->kind = optarg; break;
-        case 'f': request->format = *optarg && strcmp(optarg, "auto") ? optarg : NULL; break;
-        case 'u': request->unit = optarg; break;
-        case 'a': request->up = optarg; break;
-        case 'n': request->max_vertices = optarg; break;
-        default: return 0;
+        case 'k':
+            request->kind = optarg;
+            break;
+        case 'f':
+            request->format = *optarg && strcmp(optarg, "auto") ? optarg : NULL;
+            break;
+        case 'u':
+            request->unit = optarg;
+            break;
+        case 'a':
+            request->up = optarg;
+            break;
+        case 'n':
+            request->max_vertices = optarg;
+            break;
+        default:
+            return 0;
         }
     }
-    if (optind == argc && request->kind && (!strcmp(request->kind, "strands") || !strcmp(request->kind, "head"))) return 1;
+    if (optind == argc && request->kind &&
+        (!strcmp(request->kind, "strands") || !strcmp(request->kind, "head")))
+        return 1;
     fputs("groom-worker inspect: --kind strands or --kind head is needed, and no other argument\n", stderr);
     return 0;
 }
 
-static groom_status inspect(struct request *request, struct worker_input *input, const struct groom_context *context,
-                            struct groom_diag *diag)
+static groom_status inspect(struct request *request, struct worker_input *input,
+                            const struct groom_context *context, struct groom_diag *diag)
 {
     groom_status st = worker_frame_parse(request->unit, request->up, &request->frame, diag);
-    if (st == GROOM_OK) st = worker_count_parse("--max-vertices", request->max_vertices, UINT32_MAX, &request->n_max, diag);
-    if (st != GROOM_OK) return st;
+    if (st == GROOM_OK)
+        st = worker_count_parse("--max-vertices", request->max_vertices, UINT32_MAX, &request->n_max, diag);
+    if (st != GROOM_OK)
+        return st;
     return (!strcmp(request->kind, "head") ? inspect_head : inspect_strands)(request, input, context, diag);
 }
 
@@ -162,11 +188,13 @@ int worker_inspect(int argc, char **argv)
     struct groom_context context = {0};
     struct worker_input input;
     struct groom_diag diag = {0};
-    if (!parse(argc, argv, &request)) return WORKER_USAGE;
+    if (!parse(argc, argv, &request))
+        return WORKER_USAGE;
     worker_enter_sandbox();
     worker_input_open(STDIN_FILENO, &input);
     groom_status st = groom_pool_create(worker_threads(), &context.pool);
-    if (st == GROOM_OK) st = inspect(&request, &input, &context, &diag);
+    if (st == GROOM_OK)
+        st = inspect(&request, &input, &context, &diag);
     groom_pool_destroy(context.pool);
     worker_input_close(&input);
     return st == GROOM_OK ? WORKER_OK : worker_print_problem(st, &diag);

@@ -27,18 +27,21 @@ static int is_hash(const char *text)
     return strlen(text) == ORDER_HASH_SIZE - 1 && strspn(text, "0123456789abcdef") == ORDER_HASH_SIZE - 1;
 }
 
-static groom_status parse_blob(const cJSON *object, const char *what, struct order_blob *blob, struct groom_diag *diag)
+static groom_status parse_blob(const cJSON *object, const char *what, struct order_blob *blob,
+                               struct groom_diag *diag)
 {
     double n_bytes = number_of(object, "bytes", -1);
     if (!is_hash(text_of(object, "sha256")) || n_bytes < 0 || n_bytes > 1e15)
-        return groom_fail(diag, GROOM_EFORMAT, "the daemon's order names no usable %s (sha256 and bytes)", what);
+        return groom_fail(diag, GROOM_EFORMAT, "the daemon's order names no usable %s (sha256 and bytes)",
+                          what);
     snprintf(blob->sha256, sizeof blob->sha256, "%s", text_of(object, "sha256"));
     snprintf(blob->path, sizeof blob->path, "%s", text_of(object, "path"));
     blob->n_bytes = (uint64_t)n_bytes;
     return GROOM_OK;
 }
 
-static groom_status parse_input(const cJSON *object, const char *what, struct order_input *input, struct groom_diag *diag)
+static groom_status parse_input(const cJSON *object, const char *what, struct order_input *input,
+                                struct groom_diag *diag)
 {
     const char *format = text_of(object, "format");
     snprintf(input->id, sizeof input->id, "%s", text_of(object, "id"));
@@ -58,15 +61,19 @@ static groom_status parse_options(const cJSON *order_json, struct order *order, 
 
 static groom_status parse_members(const cJSON *json, struct order *order, struct groom_diag *diag)
 {
-    const cJSON *inputs = member(json, "inputs"), *head = member(inputs, "head"), *checkpoint = member(json, "checkpoint");
+    const cJSON *inputs = member(json, "inputs"), *head = member(inputs, "head"),
+                *checkpoint = member(json, "checkpoint");
     groom_status st;
-    if (!cJSON_IsObject(inputs)) return groom_fail(diag, GROOM_EFORMAT, "the daemon's order is not one: it has no inputs");
+    if (!cJSON_IsObject(inputs))
+        return groom_fail(diag, GROOM_EFORMAT, "the daemon's order is not one: it has no inputs");
     snprintf(order->job, sizeof order->job, "%s", text_of(json, "job"));
     snprintf(order->kind, sizeof order->kind, "%s", text_of(json, "kind"));
     order->attempt = (uint32_t)number_of(json, "attempt", 1);
     st = parse_input(member(inputs, "strands"), "strands", &order->strands, diag);
-    if (st == GROOM_OK && cJSON_IsObject(head)) st = parse_input(head, "head", &order->head, diag);
-    if (st == GROOM_OK && cJSON_IsObject(checkpoint)) st = parse_blob(checkpoint, "checkpoint", &order->checkpoint, diag);
+    if (st == GROOM_OK && cJSON_IsObject(head))
+        st = parse_input(head, "head", &order->head, diag);
+    if (st == GROOM_OK && cJSON_IsObject(checkpoint))
+        st = parse_blob(checkpoint, "checkpoint", &order->checkpoint, diag);
     return st == GROOM_OK ? parse_options(json, order, diag) : st;
 }
 
@@ -76,7 +83,8 @@ groom_status order_parse(const char *json, size_t n_bytes, struct order *order, 
     memset(order, 0, sizeof *order);
     groom_status st = parse_members(object, order, diag);
     cJSON_Delete(object);
-    if (st != GROOM_OK) order_finish(order);
+    if (st != GROOM_OK)
+        order_finish(order);
     return st;
 }
 

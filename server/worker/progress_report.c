@@ -27,7 +27,8 @@ static void add_time_left(cJSON *message, const struct progress_report *report, 
 {
     double share = fraction - report->first_fraction;
     if (share >= SMALLEST_SHARE)
-        cJSON_AddNumberToObject(message, "eta_s", round(10 * (now_s - report->started_s) * (1 - fraction) / share) / 10);
+        cJSON_AddNumberToObject(message, "eta_s",
+                                round(10 * (now_s - report->started_s) * (1 - fraction) / share) / 10);
 }
 
 static void add_losses(cJSON *message, const struct progress_report *report)
@@ -74,11 +75,15 @@ static int says_cancel(const struct http_response *response)
 static groom_status post(struct progress_report *report, const char *text)
 {
     struct http_response response;
-    struct http_request request = {.method = "POST", .path = WORK_PATH_PROGRESS, .content_type = "application/json",
-                                   .body = text, .n_body = strlen(text)};
+    struct http_request request = {.method = "POST",
+                                   .path = WORK_PATH_PROGRESS,
+                                   .content_type = "application/json",
+                                   .body = text,
+                                   .n_body = strlen(text)};
     groom_status st = work_link_mention(report->link, &request, &response, NULL);
     /* a message that was not taken is sent again, with what has come since */
-    if (response.status == 200) report->n_losses = 0;
+    if (response.status == 200)
+        report->n_losses = 0;
     if (st == GROOM_OK && says_cancel(&response)) {
         snprintf(report->link->why, sizeof report->link->why, "the job is cancelled");
         st = GROOM_ECANCELLED;
@@ -90,8 +95,10 @@ static groom_status post(struct progress_report *report, const char *text)
 groom_status progress_report_send(struct progress_report *report, int now)
 {
     double now_s = clock_s();
-    if (report->halted || *report->link->stop) return GROOM_ECANCELLED;
-    if (!now && now_s - report->sent_s < INTERVAL_S) return GROOM_OK;
+    if (report->halted || *report->link->stop)
+        return GROOM_ECANCELLED;
+    if (!now && now_s - report->sent_s < INTERVAL_S)
+        return GROOM_OK;
     report->sent_s = now_s;
     char *text = progress_report_text(report, now_s);
     groom_status st = text ? post(report, text) : GROOM_OK;
@@ -107,7 +114,8 @@ groom_status progress_report_send(struct progress_report *report, int now)
 static void thin_losses(struct progress_report *report)
 {
     uint32_t kept = 0;
-    for (uint32_t i = 0; i < report->n_losses; i += 2) report->losses[kept++] = report->losses[i];
+    for (uint32_t i = 0; i < report->n_losses; i += 2)
+        report->losses[kept++] = report->losses[i];
     report->n_losses = kept;
 }
 
@@ -115,9 +123,12 @@ static void on_loss(void *user, const char *name, uint64_t iteration, double val
 {
     struct progress_report *report = user;
     struct groom_fit_progress progress = {.stage = ""};
-    if (!isfinite(value)) return;
-    if (report->fit) groom_fit_progress(report->fit, &progress);
-    if (report->n_losses == PROGRESS_MAX_LOSSES) thin_losses(report);
+    if (!isfinite(value))
+        return;
+    if (report->fit)
+        groom_fit_progress(report->fit, &progress);
+    if (report->n_losses == PROGRESS_MAX_LOSSES)
+        thin_losses(report);
     struct progress_loss *loss = &report->losses[report->n_losses++];
     snprintf(loss->stage, sizeof loss->stage, "%s", progress.stage);
     snprintf(loss->name, sizeof loss->name, "%s", name);
@@ -125,10 +136,7 @@ static void on_loss(void *user, const char *name, uint64_t iteration, double val
     loss->value = value;
 }
 
-static int on_cancelled(void *user)
-{
-    return progress_report_send(user, 0) != GROOM_OK;
-}
+static int on_cancelled(void *user) { return progress_report_send(user, 0) != GROOM_OK; }
 
 void progress_report_init(struct progress_report *report, struct work_link *link)
 {

@@ -9,8 +9,8 @@ char *worker_problem_text(groom_status status, const struct groom_diag *diag)
 {
     struct problem problem;
     int has_detail = diag && diag->status == status;
-    problem_set(&problem, groom_status_http(status), groom_status_name(status), groom_status_message(status), "%s",
-                has_detail ? diag->detail : "");
+    problem_set(&problem, groom_status_http(status), groom_status_name(status), groom_status_message(status),
+                "%s", has_detail ? diag->detail : "");
     if (has_detail) {
         snprintf(problem.pointer, sizeof problem.pointer, "%s", diag->pointer);
         problem.byte_offset = diag->byte_offset;

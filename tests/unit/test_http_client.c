@@ -17,7 +17,8 @@
 
 START_TEST(job_states_have_names_and_back)
 {
-    for (int s = 0; s < JOB_STATE_COUNT; s++) ck_assert_int_eq(job_state_parse(job_state_name((job_state)s)), s);
+    for (int s = 0; s < JOB_STATE_COUNT; s++)
+        ck_assert_int_eq(job_state_parse(job_state_name((job_state)s)), s);
     ck_assert_int_eq(job_state_parse("done"), JOB_STATE_COUNT);
     ck_assert_int_eq(job_state_parse(NULL), JOB_STATE_COUNT);
     ck_assert(!job_state_is_end(JOB_STATE_RUNNING) && job_state_is_end(JOB_STATE_CANCELLED));
@@ -70,7 +71,8 @@ START_TEST(events_come_whole_whatever_the_pieces)
         event_stream_init(&stream, on_event, NULL);
         seen[0] = '\0';
         for (size_t at = 0; at < sizeof text - 1; at += piece)
-            event_stream_feed(&stream, text + at, at + piece < sizeof text - 1 ? piece : sizeof text - 1 - at);
+            event_stream_feed(&stream, text + at,
+                              at + piece < sizeof text - 1 ? piece : sizeof text - 1 - at);
         ck_assert_str_eq(seen, "[progress|{\"a\":1}|7][message|x\ny|7][state|z|7]");
     }
 }
@@ -85,7 +87,8 @@ START_TEST(events_survive_a_reconnect_and_a_flood)
     event_stream_reconnect(&stream);
     event_stream_feed(&stream, "data: whole\n\n", 13);
     ck_assert_str_eq(seen, "[message|whole|3]");
-    for (int i = 0; i < 100000; i++) event_stream_feed(&stream, "data: xxxxxxxx", 14);
+    for (int i = 0; i < 100000; i++)
+        event_stream_feed(&stream, "data: xxxxxxxx", 14);
     event_stream_feed(&stream, "\n", 1);
 }
 END_TEST
@@ -107,12 +110,15 @@ static void *serve(void *argument)
     ssize_t got = fd < 0 ? 0 : read(fd, server->asked, sizeof server->asked - 1);
     size_t n = got > 0 ? (size_t)got : 0;
     /* a request with a body ends when it says so in it */
-    while (n && strstr(server->asked, "Content-Length") && !strstr(server->asked, "end of body") && n < sizeof server->asked - 1) {
+    while (n && strstr(server->asked, "Content-Length") && !strstr(server->asked, "end of body") &&
+           n < sizeof server->asked - 1) {
         got = read(fd, server->asked + n, sizeof server->asked - 1 - n);
-        if (got <= 0) break;
+        if (got <= 0)
+            break;
         n += (size_t)got;
     }
-    if (server->answer && write(fd, server->answer, strlen(server->answer)) < 0) perror("write");
+    if (server->answer && write(fd, server->answer, strlen(server->answer)) < 0)
+        perror("write");
     close(fd);
     return NULL;
 }
@@ -139,7 +145,8 @@ static void canned_stop(struct canned *server)
 
 static struct http_client *client_to(const char *url, const char *token)
 {
-    struct http_client *client = http_client_create(&(struct http_client_options){.base_url = url, .token = token});
+    struct http_client *client =
+        http_client_create(&(struct http_client_options){.base_url = url, .token = token});
     ck_assert_ptr_nonnull(client);
     return client;
 }
@@ -148,11 +155,16 @@ START_TEST(client_sends_the_request_and_reads_the_answer)
 {
     struct canned server;
     struct http_response response;
-    canned_start(&server, "HTTP/1.1 201 Created\r\nETag: \"4\"\r\nlocation: /v1/jobs/job_1\r\nRetry-After: 3\r\n"
-                          "Content-Type: application/json\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{}");
+    canned_start(&server,
+                 "HTTP/1.1 201 Created\r\nETag: \"4\"\r\nlocation: /v1/jobs/job_1\r\nRetry-After: 3\r\n"
+                 "Content-Type: application/json\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{}");
     struct http_client *client = client_to(server.url, "secret");
-    struct http_request request = {.method = "PATCH", .path = "/v1/x?a=b", .headers = {"If-Match: \"3\""},
-                                   .content_type = "text/plain", .body = "end of body", .n_body = 11};
+    struct http_request request = {.method = "PATCH",
+                                   .path = "/v1/x?a=b",
+                                   .headers = {"If-Match: \"3\""},
+                                   .content_type = "text/plain",
+                                   .body = "end of body",
+                                   .n_body = 11};
     ck_assert_int_eq(http_perform(client, &request, &response), HTTP_ANSWERED);
     canned_stop(&server);
     ck_assert_int_eq(response.status, 201);
@@ -215,27 +227,22 @@ START_TEST(client_names_how_a_line_fails)
 }
 END_TEST
 
-static int at_once(void *user)
-{
-    return 1;
-}
+static int at_once(void *user) { return 1; }
 
 START_TEST(client_gives_up_when_interrupted)
 {
     struct http_response response;
     struct http_client *client = http_client_create(
         &(struct http_client_options){.base_url = "http://127.0.0.1:9", .interrupted = at_once});
-    ck_assert_int_eq(http_perform(client, &(struct http_request){.method = "GET", .path = "/"}, &response), HTTP_INTERRUPTED);
+    ck_assert_int_eq(http_perform(client, &(struct http_request){.method = "GET", .path = "/"}, &response),
+                     HTTP_INTERRUPTED);
     http_response_finish(&response);
     http_client_destroy(client);
     http_client_destroy(NULL);
 }
 END_TEST
 
-static void count_tick(void *user)
-{
-    ++*(int *)user;
-}
+static void count_tick(void *user) { ++*(int *)user; }
 
 START_TEST(client_lets_go_of_all_when_a_vital_one_ends)
 {
@@ -261,5 +268,5 @@ END_TEST
 TEST_SUITE("http_client", job_states_have_names_and_back, url_encodes_what_a_query_may_not_hold,
            url_says_when_it_does_not_fit, events_come_whole_whatever_the_pieces,
            events_survive_a_reconnect_and_a_flood, client_sends_the_request_and_reads_the_answer,
-           client_keeps_a_problem_out_of_the_sink, client_names_how_a_line_fails, client_gives_up_when_interrupted,
-           client_lets_go_of_all_when_a_vital_one_ends)
+           client_keeps_a_problem_out_of_the_sink, client_names_how_a_line_fails,
+           client_gives_up_when_interrupted, client_lets_go_of_all_when_a_vital_one_ends)

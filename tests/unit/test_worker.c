@@ -26,10 +26,13 @@ static groom_status parse(const char *json, struct order *order)
 START_TEST(order_reads_inputs_options_and_checkpoint)
 {
     struct order order;
-    ck_ok(parse("{\"job\":\"job_a\",\"kind\":\"fit\",\"attempt\":3,\"options\":{\"seed\":7},\"inputs\":{\"strands\":"
-                "{\"id\":\"str_a\",\"sha256\":\"" ABC_SHA256 "\",\"bytes\":3,\"format\":\"hair\",\"unit_m\":0.01,"
-                "\"up\":\"z\",\"name\":\"n\"},\"head\":null},\"checkpoint\":{\"sha256\":\"" ABC_SHA256 "\",\"bytes\":3,"
-                "\"stage\":1,\"path\":\"/p\"}}", &order));
+    ck_ok(parse(
+        "{\"job\":\"job_a\",\"kind\":\"fit\",\"attempt\":3,\"options\":{\"seed\":7},\"inputs\":{\"strands\":"
+        "{\"id\":\"str_a\",\"sha256\":\"" ABC_SHA256 "\",\"bytes\":3,\"format\":\"hair\",\"unit_m\":0.01,"
+        "\"up\":\"z\",\"name\":\"n\"},\"head\":null},\"checkpoint\":{\"sha256\":\"" ABC_SHA256
+        "\",\"bytes\":3,"
+        "\"stage\":1,\"path\":\"/p\"}}",
+        &order));
     ck_assert_str_eq(order.options, "{\"seed\":7}");
     ck_assert_uint_eq(order.attempt, 3);
     ck_assert_str_eq(order.strands.format, "hair");
@@ -42,10 +45,12 @@ END_TEST
 
 START_TEST(order_refuses_what_is_not_one)
 {
-    static const char *const bad[] = {"", "[]", "{\"inputs\":{}}", "{\"inputs\":{\"strands\":{\"sha256\":\"../x\",\"bytes\":3}}}",
-                                      "{\"inputs\":{\"strands\":{\"sha256\":\"" ABC_SHA256 "\",\"bytes\":-1}}}"};
+    static const char *const bad[] = {
+        "", "[]", "{\"inputs\":{}}", "{\"inputs\":{\"strands\":{\"sha256\":\"../x\",\"bytes\":3}}}",
+        "{\"inputs\":{\"strands\":{\"sha256\":\"" ABC_SHA256 "\",\"bytes\":-1}}}"};
     struct order order;
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) ck_status(parse(bad[i], &order), GROOM_EFORMAT);
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        ck_status(parse(bad[i], &order), GROOM_EFORMAT);
 }
 END_TEST
 
@@ -66,9 +71,11 @@ static void *serve(void *argument)
     for (; server->answers[server->n_served]; server->n_served++) {
         const char *answer = server->answers[server->n_served];
         int fd = accept(server->listener, NULL, NULL);
-        if (read(fd, asked, sizeof asked) < 0 || write(fd, answer, strlen(answer)) < 0) perror("canned");
+        if (read(fd, asked, sizeof asked) < 0 || write(fd, answer, strlen(answer)) < 0)
+            perror("canned");
         shutdown(fd, SHUT_WR);
-        while (read(fd, asked, sizeof asked) > 0) {}
+        while (read(fd, asked, sizeof asked) > 0) {
+        }
         close(fd);
     }
     return NULL;
@@ -88,7 +95,8 @@ static void canned_start(struct canned *server, const char *const *answers)
 
 static volatile sig_atomic_t no_stop;
 
-#define ANSWER(status, body_length, body) "HTTP/1.1 " status "\r\nConnection: close\r\nContent-Length: " body_length "\r\n\r\n" body
+#define ANSWER(status, body_length, body)                                                                    \
+    "HTTP/1.1 " status "\r\nConnection: close\r\nContent-Length: " body_length "\r\n\r\n" body
 
 static groom_status ask(const char *const *answers, struct groom_diag *diag)
 {
@@ -96,7 +104,8 @@ static groom_status ask(const char *const *answers, struct groom_diag *diag)
     struct work_link link;
     canned_start(&server, answers);
     ck_assert(work_link_open(&link, server.url, "t", &no_stop));
-    groom_status st = work_link_call(&link, &(struct http_request){.method = "GET", .path = "/x"}, NULL, diag);
+    groom_status st =
+        work_link_call(&link, &(struct http_request){.method = "GET", .path = "/x"}, NULL, diag);
     work_link_close(&link);
     close(server.listener);
     pthread_join(server.thread, NULL);
@@ -105,7 +114,8 @@ static groom_status ask(const char *const *answers, struct groom_diag *diag)
 
 START_TEST(link_repeats_what_passes)
 {
-    static const char *const answers[] = {ANSWER("503 Busy", "0", ""), "HTTP/1.1 200 OK\r\nContent-Length: 9\r\n\r\ncut",
+    static const char *const answers[] = {ANSWER("503 Busy", "0", ""),
+                                          "HTTP/1.1 200 OK\r\nContent-Length: 9\r\n\r\ncut",
                                           ANSWER("200 OK", "0", ""), NULL};
     ck_ok(ask(answers, NULL));
 }
@@ -121,7 +131,8 @@ END_TEST
 START_TEST(link_tells_a_refusal_with_its_detail)
 {
     static const char *const answers[] = {
-        ANSWER("400 Bad Request", "52", "{\"type\":\"/problems/x\",\"title\":\"t\",\"detail\":\"not so\"}"), NULL};
+        ANSWER("400 Bad Request", "52", "{\"type\":\"/problems/x\",\"title\":\"t\",\"detail\":\"not so\"}"),
+        NULL};
     struct groom_diag diag;
     ck_status(ask(answers, &diag), GROOM_EIO);
     ck_assert_str_eq(diag.detail, "the daemon answered 400: not so");
@@ -133,7 +144,8 @@ START_TEST(link_stops_waiting_when_the_process_is_to_end)
     volatile sig_atomic_t stop = 1;
     struct work_link link;
     ck_assert(work_link_open(&link, "http://127.0.0.1:9", "t", &stop));
-    ck_status(work_link_call(&link, &(struct http_request){.method = "GET", .path = "/x"}, NULL, NULL), GROOM_ECANCELLED);
+    ck_status(work_link_call(&link, &(struct http_request){.method = "GET", .path = "/x"}, NULL, NULL),
+              GROOM_ECANCELLED);
     work_link_close(&link);
 }
 END_TEST
@@ -156,7 +168,8 @@ static groom_status fetch(const char *const *answers, struct blob *blob)
 
 START_TEST(blob_is_verified_and_a_broken_line_taken_up_again)
 {
-    static const char *const answers[] = {"HTTP/1.1 200 OK\r\nContent-Length: 3\r\n\r\na", ANSWER("200 OK", "3", "abc"), NULL};
+    static const char *const answers[] = {"HTTP/1.1 200 OK\r\nContent-Length: 3\r\n\r\na",
+                                          ANSWER("200 OK", "3", "abc"), NULL};
     struct blob blob;
     ck_ok(fetch(answers, &blob));
     ck_assert_uint_eq(blob.n_bytes, 3);
@@ -167,8 +180,9 @@ END_TEST
 
 START_TEST(blob_of_other_bytes_is_refused)
 {
-    static const char *const other[] = {ANSWER("200 OK", "3", "abd"), NULL}, *const longer[] = {ANSWER("200 OK", "5", "abcde"), NULL},
-                      *const shorter[] = {ANSWER("200 OK", "2", "ab"), NULL};
+    static const char *const other[] = {ANSWER("200 OK", "3", "abd"), NULL},
+                             *const longer[] = {ANSWER("200 OK", "5", "abcde"), NULL},
+                             *const shorter[] = {ANSWER("200 OK", "2", "ab"), NULL};
     struct blob blob;
     ck_status(fetch(other, &blob), GROOM_EIO);
     ck_status(fetch(shorter, &blob), GROOM_EIO);
@@ -219,16 +233,14 @@ START_TEST(problem_carries_offset_and_pointer)
     ck_assert_ptr_nonnull(strstr(text, "\"byte_offset\":128"));
     ck_assert_ptr_nonnull(strstr(text, "truncated-file"));
     free(text);
-    text = worker_problem_text(GROOM_ENOMEM, &diag); /* a diag of another failure is not taken for this one's */
+    text =
+        worker_problem_text(GROOM_ENOMEM, &diag); /* a diag of another failure is not taken for this one's */
     ck_assert_ptr_null(strstr(text, "cut"));
     free(text);
 }
 END_TEST
 
-static void *nothing(void *argument)
-{
-    return argument;
-}
+static void *nothing(void *argument) { return argument; }
 
 START_TEST(sandbox_leaves_threads_and_memory_and_no_way_out)
 {
@@ -260,8 +272,10 @@ START_TEST(input_is_read_whole_from_a_pipe_within_its_limit)
         ck_assert_int_eq(write(ends[1], "hello", 5), 5);
         close(ends[1]);
         worker_input_open(ends[0], &input);
-        if (i) ck_status(worker_input_text(&input, 4, &text, &n, NULL), GROOM_ETOOBIG);
-        else ck_ok(worker_input_text(&input, 5, &text, &n, NULL));
+        if (i)
+            ck_status(worker_input_text(&input, 4, &text, &n, NULL), GROOM_ETOOBIG);
+        else
+            ck_ok(worker_input_text(&input, 5, &text, &n, NULL));
         if (!i) {
             ck_assert_str_eq(text, "hello");
             free(text);
@@ -272,9 +286,9 @@ START_TEST(input_is_read_whole_from_a_pipe_within_its_limit)
 }
 END_TEST
 
-TEST_SUITE("worker", order_reads_inputs_options_and_checkpoint, order_refuses_what_is_not_one, link_repeats_what_passes,
-           link_leaves_quietly_when_fenced, link_tells_a_refusal_with_its_detail, link_stops_waiting_when_the_process_is_to_end,
-           blob_is_verified_and_a_broken_line_taken_up_again, blob_of_other_bytes_is_refused,
-           blob_comes_from_a_shared_folder_where_there_is_one, counts_are_whole_numbers_in_range,
-           problem_carries_offset_and_pointer,
+TEST_SUITE("worker", order_reads_inputs_options_and_checkpoint, order_refuses_what_is_not_one,
+           link_repeats_what_passes, link_leaves_quietly_when_fenced, link_tells_a_refusal_with_its_detail,
+           link_stops_waiting_when_the_process_is_to_end, blob_is_verified_and_a_broken_line_taken_up_again,
+           blob_of_other_bytes_is_refused, blob_comes_from_a_shared_folder_where_there_is_one,
+           counts_are_whole_numbers_in_range, problem_carries_offset_and_pointer,
            sandbox_leaves_threads_and_memory_and_no_way_out, input_is_read_whole_from_a_pipe_within_its_limit)
