@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/json.h"
 #include "fit/options.h"
 #include "fit/state.h"
 #include "geometry/camera_json.h"
@@ -60,7 +61,7 @@ static cJSON *cameras_json(const struct groom_fit_options *options)
 
 static cJSON *number_or_auto(double value, int automatic)
 {
-    return automatic && value == 0 ? cJSON_CreateString("auto") : cJSON_CreateNumber(value);
+    return automatic && value == 0 ? cJSON_CreateString("auto") : json_number(value);
 }
 
 static cJSON *group_json(const struct groom_fit_options *options, const char *group);

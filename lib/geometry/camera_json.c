@@ -4,27 +4,37 @@
 #include <stdio.h>
 #include <string.h>
 
-static cJSON *rotation_to_json(const double rotation[9])
-{
-    cJSON *rows = cJSON_CreateArray();
-    for (int row = 0; row < 3; row++) {
-        cJSON *one = cJSON_CreateDoubleArray(rotation + 3 * row, 3);
-        if (!cJSON_AddItemToArray(rows, one)) {
-            cJSON_Delete(one);
-            cJSON_Delete(rows);
-            return NULL;
-        }
-    }
-    return rows;
-}
+#include "base/json.h"
 
-/* Takes item, also where it fails. */
-static int add(cJSON *object, const char *name, cJSON *item)
+/* Puts item into parent, under a name or at the end; takes it also where that fails. */
+static int add(cJSON *parent, const char *name, cJSON *item)
 {
-    if (item && cJSON_AddItemToObject(object, name, item))
+    if (item && (name ? cJSON_AddItemToObject(parent, name, item) : cJSON_AddItemToArray(parent, item)))
         return 1;
     cJSON_Delete(item);
     return 0;
+}
+
+static cJSON *numbers_to_json(const double *numbers, int n)
+{
+    cJSON *array = cJSON_CreateArray();
+    for (int i = 0; array && i < n; i++)
+        if (!add(array, NULL, json_number(numbers[i]))) {
+            cJSON_Delete(array);
+            return NULL;
+        }
+    return array;
+}
+
+static cJSON *rotation_to_json(const double rotation[9])
+{
+    cJSON *rows = cJSON_CreateArray();
+    for (int row = 0; rows && row < 3; row++)
+        if (!add(rows, NULL, numbers_to_json(rotation + 3 * row, 3))) {
+            cJSON_Delete(rows);
+            return NULL;
+        }
+    return rows;
 }
 
 cJSON *camera_to_json(const struct groom_camera *camera)
@@ -32,11 +42,10 @@ cJSON *camera_to_json(const struct groom_camera *camera)
     cJSON *json = cJSON_CreateObject();
     if (json && cJSON_AddStringToObject(json, "name", camera->name) &&
         cJSON_AddNumberToObject(json, "width", camera->width) &&
-        cJSON_AddNumberToObject(json, "height", camera->height) &&
-        cJSON_AddNumberToObject(json, "fx", camera->fx) && cJSON_AddNumberToObject(json, "fy", camera->fy) &&
-        cJSON_AddNumberToObject(json, "cx", camera->cx) && cJSON_AddNumberToObject(json, "cy", camera->cy) &&
-        add(json, "rotation", rotation_to_json(camera->rotation)) &&
-        add(json, "translation", cJSON_CreateDoubleArray(camera->translation, 3)))
+        cJSON_AddNumberToObject(json, "height", camera->height) && add(json, "fx", json_number(camera->fx)) &&
+        add(json, "fy", json_number(camera->fy)) && add(json, "cx", json_number(camera->cx)) &&
+        add(json, "cy", json_number(camera->cy)) && add(json, "rotation", rotation_to_json(camera->rotation)) &&
+        add(json, "translation", numbers_to_json(camera->translation, 3)))
         return json;
     cJSON_Delete(json);
     return NULL;

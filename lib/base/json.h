@@ -1,0 +1,11 @@
+/* What cJSON leaves to be wished for. */
+#ifndef BASE_JSON_H
+#define BASE_JSON_H
+
+#include <cjson/cJSON.h>
+
+/* A number that reads back to the same bits, in as few digits as that takes; cJSON itself prints 15
+ * digits of it where those come near. value is finite. NULL where memory is out. */
+cJSON *json_number(double value);
+
+#endif
