@@ -1,0 +1,365 @@
+/* Stage `initialize`: Chang et al. 2025, Section 5.2.
+ *
+ * Strands are clustered; the clusters' mean strands, put on a root of theirs and smoothed, are the
+ * guides; medoids among the guides are the operator guides; strands are instanced by distance and
+ * follow the nearest operator guide that keeps them out of the head. */
+#include <math.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/progress.h"
+#include "fit/assign.h"
+#include "fit/estimate.h"
+#include "fit/kmeans.h"
+#include "fit/medoids.h"
+#include "fit/smooth.h"
+#include "fit/state.h"
+
+enum phase { SEED, CLUSTER, GUIDES, OPERATOR_GUIDES, INSTANCE, OPERATORS, ASSIGN, ENDED };
+
+#define STREAM_CLUSTERS 0x66690001u
+#define STREAM_MEDOIDS 0x66690002u
+
+#define FEATURE_VERTICES 16        /* of a strand, where seeds are drawn */
+#define STEP_PRODUCTS 3e10         /* multiplications of K-means in a step: about half a second on two cores */
+#define STEP_STRANDS 20000         /* assigned in a step */
+#define LEAST_CLUSTER 4            /* strands a guide, where the number of guides is automatic */
+#define GUIDES_PER_ROOT 4.0        /* guides for each square root of the number of strands */
+
+static uint32_t least(uint32_t a, uint32_t b) { return a < b ? a : b; }
+
+/* --- seeds -------------------------------------------------------------------- */
+
+static uint32_t automatic_guides(uint32_t n)
+{
+    uint32_t guides = (uint32_t)(GUIDES_PER_ROOT * sqrt(n) + 0.5);
+    guides = least(guides, n / LEAST_CLUSTER);
+    return guides ? guides : 1;
+}
+
+/* A few vertices of each strand say enough where only seeds are wanted. [n][3 * *n_vertices] */
+static float *features_of(const struct groom_fit *fit, const struct groom_allocator *allocator, uint32_t *n_vertices)
+{
+    uint32_t q = *n_vertices = least(fit->m, FEATURE_VERTICES);
+    float (*features)[3] = memory_array(allocator, (size_t)fit->n * q, sizeof *features);
+    for (uint32_t i = 0; features && i < fit->n; i++)
+        for (uint32_t a = 0; a < q; a++)
+            memcpy(features[(size_t)i * q + a], fit->target[(size_t)i * fit->m + a * (fit->m - 1) / (q - 1)],
+                   sizeof *features);
+    return (float *)features;
+}
+
+static groom_status keep_seeds(struct groom_fit *fit, const uint32_t *chosen, uint32_t n_guides,
+                               struct groom_diag *diag)
+{
+    size_t m = fit->m;
+    fit->centroids = memory_array(fit->allocator, n_guides * m, sizeof *fit->centroids);
+    fit->cluster_of = memory_array_zero(fit->allocator, fit->n, sizeof *fit->cluster_of);
+    if (!fit->centroids || !fit->cluster_of) {
+        memory_release(fit->allocator, fit->centroids, n_guides * m, sizeof *fit->centroids);
+        memory_release(fit->allocator, fit->cluster_of, fit->n, sizeof *fit->cluster_of);
+        fit->centroids = NULL;
+        fit->cluster_of = NULL;
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for %u clusters", n_guides);
+    }
+    for (uint32_t g = 0; g < n_guides; g++)
+        memcpy(fit->centroids + g * m, fit->target + chosen[g] * m, m * sizeof *fit->centroids);
+    fit->n_guides = n_guides;
+    return GROOM_OK;
+}
+
+static groom_status seed_clusters(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    uint32_t asked = fit->options.guides, n_vertices, n_chosen;
+    uint32_t wanted = least(asked == GROOM_FIT_AUTO ? automatic_guides(fit->n) : asked, fit->n);
+    float *features = features_of(fit, allocator, &n_vertices);
+    uint32_t *chosen = memory_array(allocator, wanted, sizeof *chosen);
+    struct groom_random_key key = {fit->options.seed, STREAM_CLUSTERS};
+    groom_status st;
+
+    if (!features || !chosen) {
+        st = groom_fail(diag, GROOM_ENOMEM, "no memory to seed %u clusters", wanted);
+        goto out;
+    }
+    st = kmeans_seed(features, fit->n, 3 * n_vertices, wanted, key, context, chosen, &n_chosen, diag);
+    if (st != GROOM_OK || (st = keep_seeds(fit, chosen, n_chosen, diag)) != GROOM_OK)
+        goto out;
+    if (asked > n_chosen)
+        report_note(&fit->report, "%u guides were asked for; %u different strands allow %u.", asked, n_chosen, n_chosen);
+    fit->phase = CLUSTER;
+out:
+    memory_release(allocator, features, (size_t)fit->n * n_vertices, 3 * sizeof *features);
+    memory_release(allocator, chosen, wanted, sizeof *chosen);
+    return st;
+}
+
+/* --- clusters -------------------------------------------------------------------- */
+
+/* The loss of K-means in square metres a vertex, like Eq. 5. */
+static double in_square_metres(const struct groom_fit *fit, double objective)
+{
+    return objective * fit->scale * fit->scale / fit->m;
+}
+
+static void note_objective(struct groom_fit *fit, double objective, const struct groom_context *context)
+{
+    struct groom_fit_report *report = &fit->report;
+    double value = in_square_metres(fit, objective);
+    if (fit->iteration == 0)
+        report_loss(report, "initialize", "cluster", value, value);
+    report->losses[report->n_losses - 1].after = value;
+    progress_loss(context, "cluster", fit->iteration, value);
+}
+
+static groom_status cluster(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    double products = (double)fit->n * fit->n_guides * 3 * fit->m;
+    uint32_t most = fit->options.stages.initialize.cluster_iterations;
+    struct kmeans_step step;
+    for (double spent = 0; spent == 0 || spent + products <= STEP_PRODUCTS; spent += products) {
+        groom_status st = kmeans_iterate(fit->target[0], fit->n, 3 * fit->m, fit->n_guides, fit->centroids[0],
+                                         fit->cluster_of, context, &step, diag);
+        if (st != GROOM_OK)
+            return st;
+        note_objective(fit, step.objective, context);
+        fit->iteration++;
+        if (fit->iteration >= most || (fit->iteration > 1 && step.n_changed == 0)) {
+            fit->phase = GUIDES;
+            fit->iteration = 0;
+            break;
+        }
+    }
+    return GROOM_OK;
+}
+
+/* --- guides ------------------------------------------------------------------------- */
+
+/* For each cluster, the strand among its own whose root is nearest to the mean root: it lends the
+ * guide its root, which is on the scalp then, while the mean of roots is below it. */
+static void nearest_roots(const struct groom_fit *fit, uint32_t *strand_of, float *squared)
+{
+    for (uint32_t g = 0; g < fit->n_guides; g++)
+        squared[g] = INFINITY;
+    for (uint32_t i = 0; i < fit->n; i++) {
+        uint32_t g = fit->cluster_of[i];
+        const float *root = fit->target[(size_t)i * fit->m], *mean = fit->centroids[(size_t)g * fit->m];
+        float x = root[0] - mean[0], y = root[1] - mean[1], z = root[2] - mean[2], d = x * x + y * y + z * z;
+        if (d < squared[g]) {
+            squared[g] = d;
+            strand_of[g] = i;
+        }
+    }
+}
+
+/* The mean strand moved as a whole: the instanced strands, which take shapes from guides and roots
+ * from themselves (Eq. 3), stay where the cluster's mean is. */
+static void place_guides(const struct groom_fit *fit, const uint32_t *strand_of, struct groom *groom)
+{
+    for (uint32_t g = 0; g < fit->n_guides; g++) {
+        const float *root = fit->roots[strand_of[g]];
+        float (*guide)[3] = groom->guides + (size_t)g * fit->m;
+        const float (*mean)[3] = (const float (*)[3])(fit->centroids + (size_t)g * fit->m);
+        memcpy(groom->guide_uv[g], fit->root_uv[strand_of[g]], sizeof groom->guide_uv[g]);
+        for (uint32_t j = 0; j < fit->m; j++)
+            for (int c = 0; c < 3; c++)
+                guide[j][c] = root[c] + fit->scale * (mean[j][c] - mean[0][c]);
+    }
+}
+
+static struct groom_shape shape_of(const struct groom_fit *fit)
+{
+    const struct groom_fit_options *options = &fit->options;
+    uint32_t quarter = (fit->n_guides + 3) / 4;
+    return (struct groom_shape){
+        .n_strands = fit->n, .n_vertices = fit->m, .n_guides = fit->n_guides,
+        .n_operator_guides = options->operator_guides == GROOM_FIT_AUTO ? quarter
+                                                                        : least(options->operator_guides, fit->n_guides),
+        .n_instancing = least(options->interpolation_guides, fit->n_guides)};
+}
+
+static void note_shape(struct groom_fit *fit, const struct groom_shape *shape)
+{
+    const struct groom_fit_options *options = &fit->options;
+    fit->report.n_guides = shape->n_guides;
+    fit->report.n_operator_guides = shape->n_operator_guides;
+    if (options->operator_guides > shape->n_operator_guides)
+        report_note(&fit->report, "%u operator guides were asked for; there are only %u guides.",
+                    options->operator_guides, shape->n_guides);
+    if (options->interpolation_guides > shape->n_instancing)
+        report_note(&fit->report, "Each strand blends all %u guides there are.", shape->n_instancing);
+}
+
+static groom_status make_guides(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    struct groom_shape shape = shape_of(fit);
+    struct groom_context own = {.allocator = fit->allocator}; /* the groom outlives the step's context */
+    uint32_t *strand_of = memory_array(allocator, fit->n_guides, sizeof *strand_of);
+    float *squared = memory_array(allocator, fit->n_guides, sizeof *squared);
+    uint32_t n_fixed = (uint32_t)(fit->options.stages.initialize.fixed_fraction * fit->m);
+    struct groom *groom = NULL;
+    groom_status st;
+
+    if (!strand_of || !squared) {
+        st = groom_fail(diag, GROOM_ENOMEM, "no memory for %u guides", fit->n_guides);
+        goto out;
+    }
+    if ((st = groom_create(shape, &own, &groom, diag)) != GROOM_OK)
+        goto out;
+    groom->scalp = fit->report.scalp;
+    memcpy(groom->roots, fit->roots, fit->n * sizeof *fit->roots);
+    memcpy(groom->root_uv, fit->root_uv, fit->n * sizeof *fit->root_uv);
+    nearest_roots(fit, strand_of, squared);
+    place_guides(fit, strand_of, groom);
+    st = smooth_polylines(groom->guides, fit->n_guides, fit->m, n_fixed, fit->options.stages.initialize.lambda_smooth,
+                          fit->options.stages.initialize.n_smooth, context, diag);
+    if (st != GROOM_OK)
+        goto out;
+    note_shape(fit, &shape);
+    fit->groom = groom;
+    groom = NULL;
+    fit->phase = OPERATOR_GUIDES;
+out:
+    groom_destroy(groom);
+    memory_release(allocator, strand_of, fit->n_guides, sizeof *strand_of);
+    memory_release(allocator, squared, fit->n_guides, sizeof *squared);
+    return st;
+}
+
+/* --- operator guides, instancing ----------------------------------------------------- */
+
+static groom_status choose_operator_guides(struct groom_fit *fit, const struct groom_context *context,
+                                           struct groom_diag *diag)
+{
+    struct groom *groom = fit->groom;
+    struct groom_random_key key = {fit->options.seed, STREAM_MEDOIDS};
+    double before, after;
+    groom_status st = medoids_choose(groom->guides[0], groom->n_guides, 3 * groom->n_vertices, groom->n_operator_guides,
+                                     fit->options.stages.initialize.medoid_iterations, key, context,
+                                     groom->operator_guide, &before, &after, diag);
+    if (st != GROOM_OK)
+        return st;
+    double per_vertex = 1 / sqrt(groom->n_vertices);
+    report_loss(&fit->report, "initialize", "medoids", before * per_vertex, after * per_vertex);
+    fit->phase = INSTANCE;
+    return GROOM_OK;
+}
+
+static groom_status instance(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    float sigma = (float)fit->options.stages.initialize.sigma_instance;
+    groom_status st = groom_instance_by_distance(fit->groom, sigma, context, diag);
+    if (st == GROOM_OK)
+        st = assign_nearest(fit->groom, context, diag);
+    if (st == GROOM_OK)
+        fit->phase = OPERATORS;
+    return st;
+}
+
+/* --- operators ------------------------------------------------------------------------- */
+
+static groom_status make_operators(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    struct groom *groom = fit->groom;
+    struct estimates estimates;
+    int estimate = fit->options.stages.initialize.estimate_operators;
+    groom_status st = estimate ? estimate_operators(fit, context, &estimates, diag) : GROOM_OK;
+    for (uint32_t i = 0; st == GROOM_OK && i < fit->options.n_operators; i++) {
+        st = groom_insert_operator(groom, i, fit->options.operators[i], fit->options.seed, diag);
+        if (st == GROOM_OK && estimate)
+            estimate_apply(&estimates, &groom->operators[i]);
+    }
+    if (st == GROOM_OK) {
+        fit->phase = ASSIGN;
+        return GROOM_OK;
+    }
+    while (groom->n_operators > 0 && groom_remove_operator(groom, groom->n_operators - 1, NULL) == GROOM_OK)
+        continue;
+    return st;
+}
+
+/* --- assignment ---------------------------------------------------------------------------- */
+
+/* The strongest clump of the chain: what pulls strands across. 0: nothing does. */
+static float clump_profile(const struct groom *groom)
+{
+    float profile = 0;
+    for (uint32_t i = 0; i < groom->n_operators; i++)
+        if (groom->operators[i].type == GROOM_OPERATOR_CLUMP)
+            profile = fmaxf(profile, fmaxf(groom->operators[i].parameter[0], 1));
+    return profile;
+}
+
+static groom_status assign(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    float profile = clump_profile(fit->groom);
+    float clearance = (float)fit->options.stages.initialize.head_clearance * fit->ordinary;
+    uint32_t first = fit->iteration, count = least(fit->n - first, STEP_STRANDS);
+    struct assign_counts counts = {0};
+
+    if (fit->bvh && profile > 0) {
+        groom_status st = assign_out_of_head(fit->groom, fit->bvh, profile, clearance, first, count, context, &counts, diag);
+        if (st != GROOM_OK)
+            return st;
+        fit->report.n_reassigned += counts.n_reassigned;
+        fit->report.n_penetrating += counts.n_penetrating;
+        fit->iteration += count;
+        if (fit->iteration < fit->n)
+            return GROOM_OK;
+    }
+    if (groom_validate(fit->groom, diag) != GROOM_OK)
+        return groom_fail(diag, GROOM_EINTERNAL, "stage initialize made a groom that is none");
+    if (fit->options.n_cameras > 0)
+        report_note(&fit->report, "Cameras were read; stage initialize uses all strands, seen or not.");
+    fit->phase = ENDED;
+    return GROOM_OK;
+}
+
+groom_status initialize_step(struct groom_fit *fit, int *ended, const struct groom_context *context,
+                             struct groom_diag *diag)
+{
+    groom_status st = GROOM_EINTERNAL;
+    switch ((enum phase)fit->phase) {
+    case SEED: st = seed_clusters(fit, context, diag); break;
+    case CLUSTER: st = cluster(fit, context, diag); break;
+    case GUIDES: st = make_guides(fit, context, diag); break;
+    case OPERATOR_GUIDES: st = choose_operator_guides(fit, context, diag); break;
+    case INSTANCE: st = instance(fit, context, diag); break;
+    case OPERATORS: st = make_operators(fit, context, diag); break;
+    case ASSIGN: st = assign(fit, context, diag); break;
+    case ENDED: break;
+    }
+    *ended = st == GROOM_OK && fit->phase == ENDED;
+    return st;
+}
+
+double initialize_fraction(const struct groom_fit *fit)
+{
+    /* where each phase begins, by its time on 30 000 strands */
+    static const double begin[] = {0, 0.15, 0.7, 0.72, 0.76, 0.8, 0.82, 1};
+    double within = 0;
+    if (fit->phase == CLUSTER)
+        within = (double)fit->iteration / fit->options.stages.initialize.cluster_iterations;
+    if (fit->phase == ASSIGN)
+        within = (double)fit->iteration / fit->n;
+    return fit->phase >= ENDED ? 1 : begin[fit->phase] + within * (begin[fit->phase + 1] - begin[fit->phase]);
+}
+
+int initialize_sound(const struct groom_fit *fit)
+{
+    int has_clusters = fit->n_guides > 0, has_groom = fit->groom != NULL;
+    switch ((enum phase)fit->phase) {
+    case SEED: return !has_clusters && !has_groom;
+    case CLUSTER:
+        return has_clusters && !has_groom && fit->iteration < fit->options.stages.initialize.cluster_iterations &&
+               (fit->iteration == 0 || fit->report.n_losses > 0);
+    case GUIDES: return has_clusters && !has_groom;
+    case OPERATOR_GUIDES:
+    case INSTANCE:
+    case OPERATORS: return has_clusters && has_groom && fit->groom->n_operators == 0;
+    case ASSIGN: return has_clusters && has_groom && fit->iteration < fit->n;
+    case ENDED: break;
+    }
+    return 0;
+}
