@@ -21,12 +21,12 @@ void builder_init(struct builder *builder, const struct groom_read_options *opti
                   const struct groom_context *context, struct groom_read_report *report)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
-    *builder = (struct builder){
-        .report = report,
-        .unit_m = options->frame.unit_m > 0 ? options->frame.unit_m : 1,
-        .z_up = options->frame.up == GROOM_UP_Z,
-        .max_vertices = options->max_vertices && options->max_vertices < UINT32_MAX ? options->max_vertices
-                                                                                    : UINT32_MAX};
+    *builder = (struct builder){.report = report,
+                                .unit_m = options->frame.unit_m > 0 ? options->frame.unit_m : 1,
+                                .z_up = options->frame.up == GROOM_UP_Z,
+                                .max_vertices = options->max_vertices && options->max_vertices < UINT32_MAX
+                                                    ? options->max_vertices
+                                                    : UINT32_MAX};
     chunks_init(&builder->points, allocator, 3 * sizeof(float));
     chunks_init(&builder->first, allocator, sizeof(uint32_t));
     chunks_init(&builder->root_uv, allocator, 2 * sizeof(float));
@@ -47,8 +47,9 @@ groom_status builder_fail(const struct builder *builder, uint64_t offset, struct
         return groom_fail_at(diag, GROOM_ETOOBIG, (int64_t)offset,
                              "more than %llu vertices by byte %llu, which is the limit here",
                              (unsigned long long)builder->max_vertices, (unsigned long long)offset);
-    return groom_fail_at(diag, GROOM_ENOMEM, (int64_t)offset, "memory ran out at byte %llu, after %llu vertices",
-                         (unsigned long long)offset, (unsigned long long)builder->points.n);
+    return groom_fail_at(diag, GROOM_ENOMEM, (int64_t)offset,
+                         "memory ran out at byte %llu, after %llu vertices", (unsigned long long)offset,
+                         (unsigned long long)builder->points.n);
 }
 
 static int fail(struct builder *builder, groom_status status)
@@ -72,7 +73,8 @@ int builder_reserve(struct builder *builder, uint64_t n_strands, uint64_t n_vert
 static inline void convert(const struct builder *builder, float out[3], double x, double y, double z)
 {
     double a = x * builder->unit_m, b = y * builder->unit_m, c = z * builder->unit_m;
-    int near = fabs(a) <= BUILDER_FARTHEST_M && fabs(b) <= BUILDER_FARTHEST_M && fabs(c) <= BUILDER_FARTHEST_M;
+    int near =
+        fabs(a) <= BUILDER_FARTHEST_M && fabs(b) <= BUILDER_FARTHEST_M && fabs(c) <= BUILDER_FARTHEST_M;
     out[0] = near ? (float)a : INFINITY;
     out[1] = (float)(builder->z_up ? c : b);
     out[2] = (float)(builder->z_up ? -b : c);
@@ -100,8 +102,8 @@ static int all_near(const float *values, size_t n)
     return !far;
 }
 
-static void convert_records(const struct builder *builder, float (*out)[3], const unsigned char *bytes, size_t n,
-                            size_t stride)
+static void convert_records(const struct builder *builder, float (*out)[3], const unsigned char *bytes,
+                            size_t n, size_t stride)
 {
     if (stride == sizeof *out && !builder->z_up) {
         scale_packed(builder, out[0], bytes, 3 * n);
@@ -109,7 +111,8 @@ static void convert_records(const struct builder *builder, float (*out)[3], cons
             return;
     }
     for (size_t i = 0; i < n; i++, bytes += stride)
-        convert(builder, out[i], (double)input_f32(bytes), (double)input_f32(bytes + 4), (double)input_f32(bytes + 8));
+        convert(builder, out[i], (double)input_f32(bytes), (double)input_f32(bytes + 4),
+                (double)input_f32(bytes + 8));
 }
 
 static int make_room(struct builder *builder)
@@ -148,7 +151,8 @@ int builder_repeat(struct builder *builder, uint64_t index)
 {
     if (!make_room(builder))
         return 0;
-    memcpy(chunks_at(&builder->points, builder->points.n), chunks_at(&builder->points, index), 3 * sizeof(float));
+    memcpy(chunks_at(&builder->points, builder->points.n), chunks_at(&builder->points, index),
+           3 * sizeof(float));
     builder->points.n++;
     return 1;
 }
@@ -286,7 +290,8 @@ static int take_root_uv(struct builder *builder, struct groom_strands *strands)
     if (builder->root_uv.n == 0)
         return 1;
     if (!compact_root_uv(builder, strands->n_strands)) {
-        report_warn(builder->report, "the file's scalp coordinates are not one finite pair a strand: ignored");
+        report_warn(builder->report,
+                    "the file's scalp coordinates are not one finite pair a strand: ignored");
         return 1;
     }
     strands->root_uv = chunks_take(&builder->root_uv);
@@ -297,21 +302,25 @@ static int take_root_uv(struct builder *builder, struct groom_strands *strands)
 
 static void report_dropped(struct groom_read_report *report)
 {
-    const struct { uint64_t n; const char *why; } rows[] = {
-        {report->n_dropped_short, "fewer than two vertices"},
-        {report->n_dropped_zero_length, "no length"},
-        {report->n_dropped_not_finite, "a coordinate that is not finite, or beyond 1000 km"}};
+    const struct {
+        uint64_t n;
+        const char *why;
+    } rows[] = {{report->n_dropped_short, "fewer than two vertices"},
+                {report->n_dropped_zero_length, "no length"},
+                {report->n_dropped_not_finite, "a coordinate that is not finite, or beyond 1000 km"}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
         if (rows[i].n)
             report_warn(report, "%llu of %llu strands dropped: %s", (unsigned long long)rows[i].n,
                         (unsigned long long)report->n_strands_in_file, rows[i].why);
 }
 
-static groom_status refuse_empty(const struct groom_read_report *report, uint64_t offset, struct groom_diag *diag)
+static groom_status refuse_empty(const struct groom_read_report *report, uint64_t offset,
+                                 struct groom_diag *diag)
 {
-    return groom_fail_at(diag, GROOM_EEMPTY, (int64_t)offset, "none of the %llu strands up to byte %llu is usable%s%s",
-                         (unsigned long long)report->n_strands_in_file, (unsigned long long)offset,
-                         report->n_warnings ? ": " : "", report->n_warnings ? report->warnings[report->n_warnings - 1] : "");
+    return groom_fail_at(
+        diag, GROOM_EEMPTY, (int64_t)offset, "none of the %llu strands up to byte %llu is usable%s%s",
+        (unsigned long long)report->n_strands_in_file, (unsigned long long)offset,
+        report->n_warnings ? ": " : "", report->n_warnings ? report->warnings[report->n_warnings - 1] : "");
 }
 
 groom_status builder_take(struct builder *builder, const struct groom_context *context, uint64_t offset,

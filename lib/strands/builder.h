@@ -20,13 +20,13 @@ struct builder {
     double unit_m;
     int z_up;
     uint64_t max_vertices;
-    groom_status status;      /* why a call answered 0: GROOM_ENOMEM or GROOM_ETOOBIG */
-    struct chunks points;     /* float[3]: kept ones, a gap, and those still to be cut */
-    uint64_t n_kept;          /* points[0 .. n_kept-1] belong to kept strands */
-    uint64_t n_cut;           /* points[n_cut ..] are still to be cut */
-    struct chunks first;      /* uint32_t: where each kept strand begins */
-    struct chunks root_uv;    /* float[2] of every strand in the file, dropped ones among them */
-    struct chunks dropped;    /* uint32_t: ordinals of dropped strands, where root_uv matters */
+    groom_status status;   /* why a call answered 0: GROOM_ENOMEM or GROOM_ETOOBIG */
+    struct chunks points;  /* float[3]: kept ones, a gap, and those still to be cut */
+    uint64_t n_kept;       /* points[0 .. n_kept-1] belong to kept strands */
+    uint64_t n_cut;        /* points[n_cut ..] are still to be cut */
+    struct chunks first;   /* uint32_t: where each kept strand begins */
+    struct chunks root_uv; /* float[2] of every strand in the file, dropped ones among them */
+    struct chunks dropped; /* uint32_t: ordinals of dropped strands, where root_uv matters */
     int keeps_root_uv;
 };
 

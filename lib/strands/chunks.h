@@ -9,19 +9,19 @@
 
 #include "base/memory.h"
 
-#define CHUNK_SHIFT 12
+#define CHUNK_SHIFT    12
 #define CHUNK_ELEMENTS ((uint64_t)1 << CHUNK_SHIFT)
 
 struct chunks {
     const struct groom_allocator *allocator;
     size_t element_size;
-    uint64_t n;        /* elements in use */
-    uint64_t n_room;   /* elements there is memory for */
+    uint64_t n;      /* elements in use */
+    uint64_t n_room; /* elements there is memory for */
     unsigned char **table;
     size_t n_chunks, table_capacity;
-    unsigned char *slab;     /* the first chunks, in one piece, or NULL */
-    uint64_t n_slab;         /* elements of the slab */
-    size_t n_slab_chunks;    /* table entries that point into it */
+    unsigned char *slab;  /* the first chunks, in one piece, or NULL */
+    uint64_t n_slab;      /* elements of the slab */
+    size_t n_slab_chunks; /* table entries that point into it */
 };
 
 void chunks_init(struct chunks *chunks, const struct groom_allocator *allocator, size_t element_size);

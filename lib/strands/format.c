@@ -13,7 +13,7 @@ struct format_row {
 
 static const struct format_row rows[GROOM_FORMAT_COUNT] = {
     [GROOM_FORMAT_AUTO] = {"auto", "application/octet-stream", "bin", 1, 0},
-#define ROW(constant, name, media, extension, readable, writable, text) \
+#define ROW(constant, name, media, extension, readable, writable, text)                                      \
     [constant] = {name, media, extension, readable, writable},
     GROOM_FORMAT_LIST(ROW)
 #undef ROW
@@ -42,8 +42,10 @@ static groom_status refuse_name(const char *name, struct groom_diag *diag)
 
 groom_status groom_format_parse(const char *name, groom_format *format, struct groom_diag *diag)
 {
-    static const struct { const char *alias; groom_format format; } aliases[] = {
-        {"usd", GROOM_FORMAT_USDA}, {"bin", GROOM_FORMAT_CT2HAIR}};
+    static const struct {
+        const char *alias;
+        groom_format format;
+    } aliases[] = {{"usd", GROOM_FORMAT_USDA}, {"bin", GROOM_FORMAT_CT2HAIR}};
     for (size_t i = 0; i < sizeof aliases / sizeof aliases[0]; i++)
         if (strcmp(name, aliases[i].alias) == 0) {
             *format = aliases[i].format;

@@ -43,8 +43,8 @@ static void report(struct input *input)
 
 static void read_some(struct input *input)
 {
-    int64_t n = input->source.read(input->source.user, input->buffer + input->end,
-                                   INPUT_CAPACITY - input->end);
+    int64_t n =
+        input->source.read(input->source.user, input->buffer + input->end, INPUT_CAPACITY - input->end);
     if (n < 0 || (uint64_t)n > INPUT_CAPACITY - input->end)
         input->status = GROOM_EIO;
     else if (n == 0)

@@ -1,8 +1,8 @@
 /* Buffered input: a source seen through a window of fixed size, with the offset of every byte.
  *
  * The window holds INPUT_CAPACITY bytes and is followed by zero bytes, so that a scanner may run
- * to the end of it without counting, and read eight bytes at once. Failures of the source and a cancelled context are kept, and
- * are what every later call answers. */
+ * to the end of it without counting, and read eight bytes at once. Failures of the source and a cancelled
+ * context are kept, and are what every later call answers. */
 #ifndef STRANDS_INPUT_H
 #define STRANDS_INPUT_H
 
@@ -12,7 +12,7 @@
 #include "groom/format.h"
 
 #define INPUT_CAPACITY 65536
-#define INPUT_PADDING 16
+#define INPUT_PADDING  16
 
 struct input {
     struct groom_source source;
@@ -45,8 +45,8 @@ GROOM_MUST_CHECK groom_status input_take(struct input *input, size_t n, const ch
 
 /* As many whole records of `size` bytes as the window holds, at least 1 and at most `limit`, consumed. */
 GROOM_MUST_CHECK groom_status input_records(struct input *input, size_t size, uint64_t limit,
-                                            const char *what, const unsigned char **records,
-                                            size_t *n, struct groom_diag *diag);
+                                            const char *what, const unsigned char **records, size_t *n,
+                                            struct groom_diag *diag);
 
 GROOM_MUST_CHECK groom_status input_skip(struct input *input, uint64_t n, const char *what,
                                          struct groom_diag *diag);

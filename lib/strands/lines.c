@@ -191,7 +191,8 @@ static void warn(const struct lines *lines, uint64_t n_loops, uint64_t n_unused)
         report_warn(report, "%llu vertices are shared by lines that are not one strand, and were repeated",
                     (unsigned long long)lines->n_repeated);
     if (n_loops)
-        report_warn(report, "%llu closed lines were opened at their first vertex", (unsigned long long)n_loops);
+        report_warn(report, "%llu closed lines were opened at their first vertex",
+                    (unsigned long long)n_loops);
 }
 
 int lines_cut(struct lines *lines)

@@ -15,11 +15,34 @@ typedef unsigned __int128 u128;
 
 /* 5^k for k < 45: 103 bits at most, so that 24 bits of mantissa may join it (35 is the largest here). */
 
-static const uint64_t powers_of_five[28] = {
-    1, 5, 25, 125, 625, 3125, 15625, 78125, 390625, 1953125, 9765625, 48828125, 244140625, 1220703125,
-    6103515625, 30517578125, 152587890625, 762939453125, 3814697265625, 19073486328125, 95367431640625,
-    476837158203125, 2384185791015625, 11920928955078125, 59604644775390625, 298023223876953125,
-    1490116119384765625, 7450580596923828125};
+static const uint64_t powers_of_five[28] = {1,
+                                            5,
+                                            25,
+                                            125,
+                                            625,
+                                            3125,
+                                            15625,
+                                            78125,
+                                            390625,
+                                            1953125,
+                                            9765625,
+                                            48828125,
+                                            244140625,
+                                            1220703125,
+                                            6103515625,
+                                            30517578125,
+                                            152587890625,
+                                            762939453125,
+                                            3814697265625,
+                                            19073486328125,
+                                            95367431640625,
+                                            476837158203125,
+                                            2384185791015625,
+                                            11920928955078125,
+                                            59604644775390625,
+                                            298023223876953125,
+                                            1490116119384765625,
+                                            7450580596923828125};
 
 static u128 power_of_five(unsigned k)
 {
@@ -43,7 +66,8 @@ static uint64_t divide_rounding(u128 value, u128 divisor)
     return (uint64_t)quotient + (rest * 2 > divisor || (rest * 2 == divisor && (quotient & 1)));
 }
 
-/* m * 2^e * 10^k, rounded to a whole number: 0 <= k <= 13, so that m * 5^k has 55 bits at most, and e + k < 0 */
+/* m * 2^e * 10^k, rounded to a whole number: 0 <= k <= 13, so that m * 5^k has 55 bits at most, and e + k < 0
+ */
 static inline uint64_t scaled_small(uint32_t m, int e, int k)
 {
     unsigned shift = (unsigned)-(e + k);

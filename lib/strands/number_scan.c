@@ -7,8 +7,9 @@
 
 #include "strands/number.h"
 
-static const double power_of_ten[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
-                                        1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+static const double power_of_ten[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                        1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+                                        1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 /* 10^27 is the last that 64 bits of mantissa hold exactly. */
 static const long double long_power_of_ten[28] = {
     1e0L,  1e1L,  1e2L,  1e3L,  1e4L,  1e5L,  1e6L,  1e7L,  1e8L,  1e9L,  1e10L, 1e11L, 1e12L, 1e13L,
@@ -25,13 +26,15 @@ static double scale_slowly(uint64_t digits, int exponent)
         value /= 1e27L;
     for (; exponent > 27; exponent -= 27)
         value *= 1e27L;
-    return (double)(exponent < 0 ? value / long_power_of_ten[-exponent] : value * long_power_of_ten[exponent]);
+    return (double)(exponent < 0 ? value / long_power_of_ten[-exponent]
+                                 : value * long_power_of_ten[exponent]);
 }
 
 static inline double scale(uint64_t digits, int exponent)
 {
     if (digits < UINT64_C(1) << 53 && exponent >= -22 && exponent <= 22)
-        return exponent < 0 ? (double)digits / power_of_ten[-exponent] : (double)digits * power_of_ten[exponent];
+        return exponent < 0 ? (double)digits / power_of_ten[-exponent]
+                            : (double)digits * power_of_ten[exponent];
     return digits ? scale_slowly(digits, exponent) : 0;
 }
 
@@ -64,7 +67,8 @@ static inline int scan_eight(const unsigned char *p, uint64_t *digits)
         return 0;
     digit = digit * 10 + (digit >> 8);
     *digits = (((digit & UINT64_C(0x000000ff000000ff)) * UINT64_C(0x000f424000000064)) +
-               ((digit >> 16 & UINT64_C(0x000000ff000000ff)) * UINT64_C(0x0000271000000001))) >> 32;
+               ((digit >> 16 & UINT64_C(0x000000ff000000ff)) * UINT64_C(0x0000271000000001))) >>
+              32;
     return 1;
 }
 
@@ -108,7 +112,10 @@ static inline const unsigned char *scan(const unsigned char *p, double *value, i
 }
 
 const unsigned char *number_scan(const unsigned char *text, double *value) { return scan(text, value, 0); }
-const unsigned char *number_scan_padded(const unsigned char *text, double *value) { return scan(text, value, 1); }
+const unsigned char *number_scan_padded(const unsigned char *text, double *value)
+{
+    return scan(text, value, 1);
+}
 
 static int matches(const unsigned char *text, const char *word)
 {

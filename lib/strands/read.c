@@ -40,13 +40,15 @@ groom_status read_expect(struct reader *reader, uint64_t n_strands, uint64_t n_v
     if (remaining < 0)
         return GROOM_OK; /* nothing to check against: memory grows with the bytes that come */
     if (bytes > (uint64_t)remaining)
-        return groom_fail_at(reader->diag, GROOM_ETRUNCATED, (int64_t)offset,
-                             "%llu strands of %llu vertices need %llu bytes from byte %llu on, where %llu are left: "
-                             "the counts before it are wrong or the data is cut off",
-                             (unsigned long long)n_strands, (unsigned long long)n_vertices, (unsigned long long)bytes,
-                             (unsigned long long)offset, (unsigned long long)remaining);
-    return builder_reserve(reader->out, n_strands, n_vertices) ? GROOM_OK
-                                                               : builder_fail(reader->out, offset, reader->diag);
+        return groom_fail_at(
+            reader->diag, GROOM_ETRUNCATED, (int64_t)offset,
+            "%llu strands of %llu vertices need %llu bytes from byte %llu on, where %llu are left: "
+            "the counts before it are wrong or the data is cut off",
+            (unsigned long long)n_strands, (unsigned long long)n_vertices, (unsigned long long)bytes,
+            (unsigned long long)offset, (unsigned long long)remaining);
+    return builder_reserve(reader->out, n_strands, n_vertices)
+               ? GROOM_OK
+               : builder_fail(reader->out, offset, reader->diag);
 }
 
 void read_warn_trailing(struct reader *reader)
@@ -59,22 +61,27 @@ void read_warn_trailing(struct reader *reader)
 /* --- the call --------------------------------------------------------------------- */
 
 static read_function *const readers[GROOM_FORMAT_COUNT] = {
-    [GROOM_FORMAT_HAIR] = read_hair, [GROOM_FORMAT_MONOHAIR] = read_monohair, [GROOM_FORMAT_DATA] = read_data,
-    [GROOM_FORMAT_CT2HAIR] = read_ct2hair, [GROOM_FORMAT_PLY] = read_ply, [GROOM_FORMAT_TFX] = read_tfx,
-    [GROOM_FORMAT_OBJ] = read_obj, [GROOM_FORMAT_JSON] = read_json, [GROOM_FORMAT_NPY] = read_npy,
-    [GROOM_FORMAT_NPZ] = read_npz};
+    [GROOM_FORMAT_HAIR] = read_hair, [GROOM_FORMAT_MONOHAIR] = read_monohair,
+    [GROOM_FORMAT_DATA] = read_data, [GROOM_FORMAT_CT2HAIR] = read_ct2hair,
+    [GROOM_FORMAT_PLY] = read_ply,   [GROOM_FORMAT_TFX] = read_tfx,
+    [GROOM_FORMAT_OBJ] = read_obj,   [GROOM_FORMAT_JSON] = read_json,
+    [GROOM_FORMAT_NPY] = read_npy,   [GROOM_FORMAT_NPZ] = read_npz};
 
-static groom_status refuse_unknown(const struct input *in, const struct recognised *found, struct groom_diag *diag)
+static groom_status refuse_unknown(const struct input *in, const struct recognised *found,
+                                   struct groom_diag *diag)
 {
     if (input_available(in) == 0)
         return groom_fail_at(diag, GROOM_ETRUNCATED, 0, "the data is empty");
-    return groom_fail_at(diag, GROOM_EUNKNOWN, 0, "%s", found->hint ? found->hint :
-                         "the bytes from 0 on are no strand format that is read here: a magic number, text, or "
-                         "counts that fit the size were expected; where they are one, name the format");
+    return groom_fail_at(
+        diag, GROOM_EUNKNOWN, 0, "%s",
+        found->hint ? found->hint
+                    : "the bytes from 0 on are no strand format that is read here: a magic number, text, or "
+                      "counts that fit the size were expected; where they are one, name the format");
 }
 
 /* Settle which reader runs: the named one, unless the bytes are certainly something else. */
-static groom_status choose(const struct input *in, groom_format named, groom_format *format, struct groom_diag *diag)
+static groom_status choose(const struct input *in, groom_format named, groom_format *format,
+                           struct groom_diag *diag)
 {
     struct recognised found = recognise(in->buffer + in->at, input_available(in), in->source.size);
     if (in->status != GROOM_OK)
@@ -82,8 +89,10 @@ static groom_status choose(const struct input *in, groom_format named, groom_for
     if (named == GROOM_FORMAT_AUTO && found.format == GROOM_FORMAT_AUTO)
         return refuse_unknown(in, &found, diag);
     if (named != GROOM_FORMAT_AUTO && found.certain && found.format != named)
-        return groom_fail_at(diag, GROOM_EFORMAT, 0, "the bytes from 0 on are %s, where %s was asked for; "
-                             "name the right format, or none", groom_format_name(found.format), groom_format_name(named));
+        return groom_fail_at(diag, GROOM_EFORMAT, 0,
+                             "the bytes from 0 on are %s, where %s was asked for; "
+                             "name the right format, or none",
+                             groom_format_name(found.format), groom_format_name(named));
     *format = named == GROOM_FORMAT_AUTO ? found.format : named;
     if (!readers[*format])
         return groom_fail(diag, GROOM_EINVAL, "%s is written here, not read", groom_format_name(*format));

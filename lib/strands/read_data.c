@@ -26,10 +26,11 @@ static groom_status read_record(struct reader *reader, uint32_t strand, uint32_t
     int64_t remaining = input_remaining(reader->in);
     uint64_t offset = input_offset(reader->in);
     if (remaining >= 0 && (uint64_t)n * stride > (uint64_t)remaining)
-        return groom_fail_at(reader->diag, GROOM_ETRUNCATED, (int64_t)offset - 4,
-                             "strand %u of %u says %u vertices at byte %llu; that is %llu bytes, where %llu are left",
-                             strand, n_strands, n, (unsigned long long)offset - 4, (unsigned long long)n * stride,
-                             (unsigned long long)remaining);
+        return groom_fail_at(
+            reader->diag, GROOM_ETRUNCATED, (int64_t)offset - 4,
+            "strand %u of %u says %u vertices at byte %llu; that is %llu bytes, where %llu are left", strand,
+            n_strands, n, (unsigned long long)offset - 4, (unsigned long long)n * stride,
+            (unsigned long long)remaining);
     status = read_points_f32(reader, n, stride, "a vertex of a strand");
     return status == GROOM_OK ? read_cut(reader, n) : status;
 }
@@ -43,7 +44,8 @@ static groom_status read_framed(struct reader *reader, size_t stride)
     /* In a well-formed file what the counts leave are the points. */
     int64_t remaining = input_remaining(reader->in);
     uint64_t counts = UINT64_C(4) * n_strands;
-    uint64_t points = remaining > 0 && (uint64_t)remaining > counts ? ((uint64_t)remaining - counts) / stride : 0;
+    uint64_t points =
+        remaining > 0 && (uint64_t)remaining > counts ? ((uint64_t)remaining - counts) / stride : 0;
     status = read_expect(reader, n_strands, points < reader->out->max_vertices ? points : 0, counts);
     for (uint32_t i = 0; i < n_strands && status == GROOM_OK; i++)
         status = read_record(reader, i, n_strands, stride);

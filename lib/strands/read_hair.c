@@ -13,8 +13,8 @@ static groom_status read_counts(struct reader *reader, struct chunks *counts, ui
     for (uint32_t i = 0; i < n_strands;) {
         const unsigned char *bytes;
         size_t n;
-        groom_status status = input_records(reader->in, 2, n_strands - i, "the list of vertex counts",
-                                            &bytes, &n, reader->diag);
+        groom_status status = input_records(reader->in, 2, n_strands - i, "the list of vertex counts", &bytes,
+                                            &n, reader->diag);
         if (status != GROOM_OK)
             return status;
         for (size_t j = 0; j < n; j++) {
@@ -29,10 +29,11 @@ static groom_status read_counts(struct reader *reader, struct chunks *counts, ui
             break;
     }
     if (sum != n_points)
-        return groom_fail_at(reader->diag, GROOM_EFORMAT, (int64_t)begin,
-                             "the vertex counts of %u strands from byte %llu on give %s%llu points, where the header says %u",
-                             n_strands, (unsigned long long)begin, sum > n_points ? "at least " : "",
-                             (unsigned long long)sum, n_points);
+        return groom_fail_at(
+            reader->diag, GROOM_EFORMAT, (int64_t)begin,
+            "the vertex counts of %u strands from byte %llu on give %s%llu points, where the header says %u",
+            n_strands, (unsigned long long)begin, sum > n_points ? "at least " : "", (unsigned long long)sum,
+            n_points);
     return GROOM_OK;
 }
 
@@ -75,8 +76,8 @@ static groom_status read_header(struct reader *reader, struct hair_header *heade
     *header = (struct hair_header){input_u32(bytes + 4), input_u32(bytes + 8), input_u32(bytes + 12),
                                    input_u32(bytes + 16)};
     if (!(header->arrays & HAS_POINTS))
-        return groom_fail_at(reader->diag, GROOM_EFORMAT, 12, "the array flags at byte 12 are 0x%x: no points",
-                             header->arrays);
+        return groom_fail_at(reader->diag, GROOM_EFORMAT, 12,
+                             "the array flags at byte 12 are 0x%x: no points", header->arrays);
     uint64_t uniform_points = (uint64_t)header->n_strands * ((uint64_t)header->default_segments + 1);
     if (!(header->arrays & HAS_SEGMENTS) && uniform_points != header->n_points)
         return groom_fail_at(reader->diag, GROOM_EFORMAT, 4,
@@ -93,9 +94,11 @@ groom_status read_hair(struct reader *reader)
     if (status != GROOM_OK)
         return status;
     uint64_t after = ((header.arrays & HAS_THICKNESS ? 4 : 0) + (header.arrays & HAS_TRANSPARENCY ? 4 : 0) +
-                      (header.arrays & HAS_COLOUR ? 12 : 0)) * (uint64_t)header.n_points;
+                      (header.arrays & HAS_COLOUR ? 12 : 0)) *
+                     (uint64_t)header.n_points;
     uint64_t before = header.arrays & HAS_SEGMENTS ? UINT64_C(2) * header.n_strands : 0;
-    status = read_expect(reader, header.n_strands, header.n_points, before + UINT64_C(12) * header.n_points + after);
+    status = read_expect(reader, header.n_strands, header.n_points,
+                         before + UINT64_C(12) * header.n_points + after);
     chunks_init(&counts, memory_allocator(reader->context), sizeof(uint16_t));
     if (status == GROOM_OK && before)
         status = read_counts(reader, &counts, header.n_strands, header.n_points, 1);
@@ -103,7 +106,8 @@ groom_status read_hair(struct reader *reader)
         status = read_strands(reader, &counts, header.n_strands, 1, header.default_segments + 1);
     chunks_finish(&counts);
     if (status == GROOM_OK)
-        status = input_skip(reader->in, after, "thickness, transparency or colour of the points", reader->diag);
+        status =
+            input_skip(reader->in, after, "thickness, transparency or colour of the points", reader->diag);
     if (status == GROOM_OK)
         read_warn_trailing(reader);
     return status;

@@ -16,7 +16,10 @@ struct json {
     struct reader *reader;
 };
 
-static groom_status fail(struct json *json, const char *what) { return text_fail(&json->text, what, json->reader->diag); }
+static groom_status fail(struct json *json, const char *what)
+{
+    return text_fail(&json->text, what, json->reader->diag);
+}
 
 static int next_is(struct json *json, char c)
 {
@@ -98,8 +101,9 @@ static groom_status read_strand(struct json *json)
     if (!next_is(json, ']'))
         return fail(json, "\",\" or \"]\" after a vertex");
 cut:
-    return builder_cut(out, builder_waiting(out)) ? GROOM_OK
-                                                  : builder_fail(out, text_offset(&json->text), json->reader->diag);
+    return builder_cut(out, builder_waiting(out))
+               ? GROOM_OK
+               : builder_fail(out, text_offset(&json->text), json->reader->diag);
 }
 
 /* [strand,...] after the bracket */
@@ -250,5 +254,7 @@ groom_status read_json(struct reader *reader)
     if (status == GROOM_OK && text_peek(&json.text) >= 0)
         return fail(&json, "the end of the data");
     text_end(&json.text);
-    return status == GROOM_OK && reader->in->status != GROOM_OK ? input_fail(reader->in, "the end", reader->diag) : status;
+    return status == GROOM_OK && reader->in->status != GROOM_OK
+               ? input_fail(reader->in, "the end", reader->diag)
+               : status;
 }

@@ -70,7 +70,8 @@ static groom_status read_dictionary(struct input *in, char header[MAX_HEADER + 1
         return status;
     if (memcmp(bytes, "\x93NUMPY", 6) != 0 || bytes[6] < 1 || bytes[6] > 3)
         return groom_fail_at(diag, GROOM_EFORMAT, (int64_t)begin,
-                             "\"\\x93NUMPY\" and version 1, 2 or 3 were expected at byte %llu", (unsigned long long)begin);
+                             "\"\\x93NUMPY\" and version 1, 2 or 3 were expected at byte %llu",
+                             (unsigned long long)begin);
     size_t length = input_u16(bytes + 8);
     if (bytes[6] > 1) { /* four bytes of length */
         if ((status = input_take(in, 2, "the length of the header", &bytes, diag)) != GROOM_OK)
@@ -78,8 +79,10 @@ static groom_status read_dictionary(struct input *in, char header[MAX_HEADER + 1
         length |= (size_t)input_u16(bytes) << 16;
     }
     if (length > MAX_HEADER)
-        return groom_fail_at(diag, GROOM_EFORMAT, (int64_t)begin + 8, "the NumPy header at byte %llu says %zu bytes; "
-                             "an array of floats needs fewer than %d", (unsigned long long)begin, length, MAX_HEADER);
+        return groom_fail_at(diag, GROOM_EFORMAT, (int64_t)begin + 8,
+                             "the NumPy header at byte %llu says %zu bytes; "
+                             "an array of floats needs fewer than %d",
+                             (unsigned long long)begin, length, MAX_HEADER);
     if ((status = input_take(in, length, "the dictionary of the NumPy header", &bytes, diag)) != GROOM_OK)
         return status;
     memcpy(header, bytes, length);
@@ -96,7 +99,8 @@ static groom_status read_header(struct input *in, struct npy *npy, int *fortran,
         return status;
     const char *order = find_key(header, "fortran_order");
     if (!parse_type(find_key(header, "descr"), npy) || !order || !parse_shape(find_key(header, "shape"), npy))
-        return groom_fail_at(diag, GROOM_EFORMAT, (int64_t)begin, "the NumPy header at byte %llu has no 'descr' of one "
+        return groom_fail_at(diag, GROOM_EFORMAT, (int64_t)begin,
+                             "the NumPy header at byte %llu has no 'descr' of one "
                              "number type, 'fortran_order' and 'shape' of at most %d dimensions: %.60s",
                              (unsigned long long)begin, NPY_MAX_DIMENSIONS, header);
     *fortran = strncmp(order, "False", 5) != 0;
@@ -117,9 +121,11 @@ groom_status npy_read_header(struct input *in, struct npy *npy, struct groom_dia
     if (status != GROOM_OK)
         return status;
     if (fortran || npy->kind != 'f' || (npy->size != 2 && npy->size != 4 && npy->size != 8))
-        return groom_fail_at(diag, GROOM_EFORMAT, (int64_t)begin, "the NumPy array at byte %llu is %s of type %c%u; "
-                             "float16, float32 or float64 in row-major order was expected", (unsigned long long)begin,
-                             fortran ? "column-major" : "row-major", npy->kind, npy->size);
+        return groom_fail_at(diag, GROOM_EFORMAT, (int64_t)begin,
+                             "the NumPy array at byte %llu is %s of type %c%u; "
+                             "float16, float32 or float64 in row-major order was expected",
+                             (unsigned long long)begin, fortran ? "column-major" : "row-major", npy->kind,
+                             npy->size);
     return GROOM_OK;
 }
 
@@ -153,7 +159,8 @@ static int add_points(struct builder *out, const unsigned char *bytes, size_t n,
     if (npy->size == 4 && !npy->big_endian)
         return builder_points_f32(out, bytes, n, 12);
     for (size_t i = 0; i < n; i++, bytes += 3 * npy->size)
-        if (!builder_point(out, value_at(bytes, npy), value_at(bytes + npy->size, npy), value_at(bytes + 2 * npy->size, npy)))
+        if (!builder_point(out, value_at(bytes, npy), value_at(bytes + npy->size, npy),
+                           value_at(bytes + 2 * npy->size, npy)))
             return 0;
     return 1;
 }
@@ -163,25 +170,28 @@ static groom_status read_strand(struct reader *reader, struct input *in, const s
     for (uint64_t left = npy->shape[1]; left > 0;) {
         const unsigned char *bytes;
         size_t n;
-        groom_status status = input_records(in, 3 * (size_t)npy->size, left, "a vertex", &bytes, &n, reader->diag);
+        groom_status status =
+            input_records(in, 3 * (size_t)npy->size, left, "a vertex", &bytes, &n, reader->diag);
         if (status != GROOM_OK)
             return status;
         if (!add_points(reader->out, bytes, n, npy))
             return builder_fail(reader->out, input_offset(in), reader->diag);
         left -= n;
     }
-    return builder_cut(reader->out, npy->shape[1]) ? GROOM_OK
-                                                   : builder_fail(reader->out, input_offset(in), reader->diag);
+    return builder_cut(reader->out, npy->shape[1])
+               ? GROOM_OK
+               : builder_fail(reader->out, input_offset(in), reader->diag);
 }
 
 groom_status npy_read_positions(struct reader *reader, struct input *in, const struct npy *npy)
 {
     groom_status status = GROOM_OK;
     if (npy->n_dimensions != 3 || npy->shape[2] != 3 || npy->shape[1] < 2)
-        return groom_fail_at(reader->diag, GROOM_EFORMAT, (int64_t)input_offset(in),
-                             "positions have %d dimensions, %llu x %llu x ...; (strands, vertices, 3) was expected",
-                             npy->n_dimensions, (unsigned long long)(npy->n_dimensions > 0 ? npy->shape[0] : 0),
-                             (unsigned long long)(npy->n_dimensions > 1 ? npy->shape[1] : 0));
+        return groom_fail_at(
+            reader->diag, GROOM_EFORMAT, (int64_t)input_offset(in),
+            "positions have %d dimensions, %llu x %llu x ...; (strands, vertices, 3) was expected",
+            npy->n_dimensions, (unsigned long long)(npy->n_dimensions > 0 ? npy->shape[0] : 0),
+            (unsigned long long)(npy->n_dimensions > 1 ? npy->shape[1] : 0));
     for (uint64_t i = 0; i < npy->shape[0] && status == GROOM_OK; i++)
         status = read_strand(reader, in, npy);
     return status;

@@ -9,12 +9,18 @@
 
 #include "strands/npy.h"
 
-#define MAX_NAME 256
-#define RATIO_MAX 64
+#define MAX_NAME   256
+#define RATIO_MAX  64
 #define RATIO_FROM (16u << 20) /* checked once this much was inflated */
 
-enum { LOCAL = 0x04034b50, CENTRAL = 0x02014b50, END = 0x06054b50, END64 = 0x06064b50, LOCATOR64 = 0x07064b50,
-       DESCRIPTOR = 0x08074b50 };
+enum {
+    LOCAL = 0x04034b50,
+    CENTRAL = 0x02014b50,
+    END = 0x06054b50,
+    END64 = 0x06064b50,
+    LOCATOR64 = 0x07064b50,
+    DESCRIPTOR = 0x08074b50
+};
 enum { STORED = 0, DEFLATED = 8 };
 enum { ENCRYPTED = 1, HAS_DESCRIPTOR = 8 };
 
@@ -33,9 +39,9 @@ struct unpacker {
     z_stream inflater;
     int inflating, ended;
     uint64_t n_in, n_out;
-    uint64_t limit;       /* stored: bytes of data, once known */
+    uint64_t limit; /* stored: bytes of data, once known */
     uint32_t crc;
-    groom_status status;  /* why it fails */
+    groom_status status; /* why it fails */
     const char *why;
 };
 
@@ -121,7 +127,8 @@ static int64_t read_deflated(struct unpacker *unpacker, void *buffer, size_t cap
 static int64_t read_unpacked(void *user, void *buffer, size_t capacity)
 {
     struct unpacker *unpacker = user;
-    int64_t n = unpacker->inflating ? read_deflated(unpacker, buffer, capacity) : read_stored(unpacker, buffer, capacity);
+    int64_t n = unpacker->inflating ? read_deflated(unpacker, buffer, capacity)
+                                    : read_stored(unpacker, buffer, capacity);
     if (n > 0) {
         unpacker->crc = (uint32_t)crc32(unpacker->crc, buffer, (uInt)n);
         unpacker->n_out += (uint64_t)n;
@@ -141,7 +148,8 @@ static groom_status open_unpacker(struct unpacker *unpacker, struct reader *read
     if (inflateInit2(&unpacker->inflater, -MAX_WBITS) == Z_OK)
         return GROOM_OK;
     unpacker->inflating = 0;
-    return groom_fail_at(reader->diag, GROOM_ENOMEM, (int64_t)entry->offset, "no memory to inflate %s", entry->name);
+    return groom_fail_at(reader->diag, GROOM_ENOMEM, (int64_t)entry->offset, "no memory to inflate %s",
+                         entry->name);
 }
 
 static void close_unpacker(struct unpacker *unpacker)
@@ -155,7 +163,8 @@ static void close_unpacker(struct unpacker *unpacker)
 static int is_named(const struct entry *entry, const char *name)
 {
     size_t n = strlen(name);
-    return strncmp(entry->name, name, n) == 0 && (entry->name[n] == 0 || strcmp(entry->name + n, ".npy") == 0);
+    return strncmp(entry->name, name, n) == 0 &&
+           (entry->name[n] == 0 || strcmp(entry->name + n, ".npy") == 0);
 }
 
 /* Refuse more than the limit before anything is unpacked; reserve nothing: a header costs nothing. */
@@ -196,10 +205,11 @@ static groom_status explain(struct reader *reader, const struct unpacker *unpack
     if (reader->in->status != GROOM_OK)
         return input_fail(reader->in, entry->name, reader->diag);
     if (unpacker->status != GROOM_OK)
-        return groom_fail_at(reader->diag, unpacker->status, offset, "array %.40s, by byte %lld of the archive: %s",
-                             entry->name, (long long)offset, unpacker->why);
-    return groom_fail_at(reader->diag, status, offset, "array %.40s, by byte %lld of the archive: %.250s", entry->name,
-                         (long long)offset, inner.detail);
+        return groom_fail_at(reader->diag, unpacker->status, offset,
+                             "array %.40s, by byte %lld of the archive: %s", entry->name, (long long)offset,
+                             unpacker->why);
+    return groom_fail_at(reader->diag, status, offset, "array %.40s, by byte %lld of the archive: %.250s",
+                         entry->name, (long long)offset, inner.detail);
 }
 
 /* A stored entry of unknown length ends with its array: its input must not read beyond that. */
@@ -226,9 +236,13 @@ static groom_status unpack_to_end(struct input *in)
     return in->status;
 }
 
-static int is_wanted(const struct entry *entry) { return is_named(entry, "positions") || is_named(entry, "root_uv"); }
+static int is_wanted(const struct entry *entry)
+{
+    return is_named(entry, "positions") || is_named(entry, "root_uv");
+}
 
-static groom_status read_entry_data(struct reader *reader, const struct entry *entry, struct unpacker *unpacker)
+static groom_status read_entry_data(struct reader *reader, const struct entry *entry,
+                                    struct unpacker *unpacker)
 {
     struct groom_source source = {read_unpacked, unpacker, -1};
     struct input in = {0};
@@ -271,13 +285,17 @@ static groom_status read_local_header(struct reader *reader, struct entry *entry
     groom_status status = input_take(reader->in, 26, "the header of an archive's entry", &b, reader->diag);
     if (status != GROOM_OK)
         return status;
-    *entry = (struct entry){.flags = input_u16(b + 2), .method = input_u16(b + 4), .crc = input_u32(b + 10),
-                            .packed = input_u32(b + 14), .unpacked = input_u32(b + 18)};
+    *entry = (struct entry){.flags = input_u16(b + 2),
+                            .method = input_u16(b + 4),
+                            .crc = input_u32(b + 10),
+                            .packed = input_u32(b + 14),
+                            .unpacked = input_u32(b + 18)};
     size_t name_length = input_u16(b + 22), extra_length = input_u16(b + 24);
     if ((status = input_take(reader->in, name_length, "the name of an entry", &b, reader->diag)) != GROOM_OK)
         return status;
     memcpy(entry->name, b, name_length < MAX_NAME ? name_length : MAX_NAME - 1);
-    if ((status = input_take(reader->in, extra_length, "the extra fields of an entry", &b, reader->diag)) != GROOM_OK)
+    if ((status = input_take(reader->in, extra_length, "the extra fields of an entry", &b, reader->diag)) !=
+        GROOM_OK)
         return status;
     if (entry->packed == UINT32_MAX || entry->unpacked == UINT32_MAX)
         read_zip64_sizes(b, extra_length, entry);
@@ -285,7 +303,8 @@ static groom_status read_local_header(struct reader *reader, struct entry *entry
     if (entry->flags & ENCRYPTED || (entry->method != STORED && entry->method != DEFLATED))
         return groom_fail_at(reader->diag, GROOM_EFORMAT, (int64_t)begin,
                              "entry %.40s at byte %llu is %s; stored or deflated was expected", entry->name,
-                             (unsigned long long)begin, entry->flags & ENCRYPTED ? "encrypted" : "compressed in another way");
+                             (unsigned long long)begin,
+                             entry->flags & ENCRYPTED ? "encrypted" : "compressed in another way");
     return GROOM_OK;
 }
 
@@ -325,15 +344,17 @@ static groom_status read_entry(struct reader *reader)
         status = read_descriptor(reader, &entry);
     if (status == GROOM_OK && (unpacker.crc != entry.crc || unpacker.n_out != entry.unpacked ||
                                (unpacker.inflating && unpacker.n_in != entry.packed)))
-        return groom_fail_at(reader->diag, GROOM_EFORMAT, (int64_t)entry.offset,
-                             "entry %.40s at byte %llu does not have the size or the checksum that the archive says",
-                             entry.name, (unsigned long long)entry.offset);
+        return groom_fail_at(
+            reader->diag, GROOM_EFORMAT, (int64_t)entry.offset,
+            "entry %.40s at byte %llu does not have the size or the checksum that the archive says",
+            entry.name, (unsigned long long)entry.offset);
     return status;
 }
 
 /* --- the directory, so that a cut is seen ------------------------------------------------------------- */
 
-static groom_status skip_record(struct reader *reader, size_t fixed, const size_t *lengths_at, size_t n_lengths)
+static groom_status skip_record(struct reader *reader, size_t fixed, const size_t *lengths_at,
+                                size_t n_lengths)
 {
     const unsigned char *b;
     uint64_t more = 0;
@@ -349,7 +370,8 @@ static groom_status skip_end64(struct reader *reader)
 {
     const unsigned char *b;
     groom_status status = input_take(reader->in, 8, "the archive's directory", &b, reader->diag);
-    return status == GROOM_OK ? input_skip(reader->in, input_u64(b), "the archive's directory", reader->diag) : status;
+    return status == GROOM_OK ? input_skip(reader->in, input_u64(b), "the archive's directory", reader->diag)
+                              : status;
 }
 
 /* One record with its signature; *done after the last. */
@@ -362,14 +384,21 @@ static groom_status read_record(struct reader *reader, int *done)
     if (status != GROOM_OK)
         return status;
     switch (input_u32(b)) {
-    case LOCAL: return read_entry(reader);
-    case CENTRAL: return skip_record(reader, 46, central_lengths, 3);
-    case END64: return skip_end64(reader);
-    case LOCATOR64: return skip_record(reader, 20, NULL, 0);
-    case END: *done = 1; return skip_record(reader, 22, end_lengths, 1);
+    case LOCAL:
+        return read_entry(reader);
+    case CENTRAL:
+        return skip_record(reader, 46, central_lengths, 3);
+    case END64:
+        return skip_end64(reader);
+    case LOCATOR64:
+        return skip_record(reader, 20, NULL, 0);
+    case END:
+        *done = 1;
+        return skip_record(reader, 22, end_lengths, 1);
     default:
         return groom_fail_at(reader->diag, GROOM_EFORMAT, (int64_t)begin,
-                             "the next entry of the zip archive was expected at byte %llu", (unsigned long long)begin);
+                             "the next entry of the zip archive was expected at byte %llu",
+                             (unsigned long long)begin);
     }
 }
 

@@ -12,9 +12,9 @@
 #include "strands/reader.h"
 #include "strands/text.h"
 
-#define MAX_ELEMENTS 16
-#define MAX_PROPERTIES 64 /* 0.5 KiB of a row each; GaussianHaircut has 6, splats about 60 */
-#define MAX_NAME 32
+#define MAX_ELEMENTS          16
+#define MAX_PROPERTIES        64 /* 0.5 KiB of a row each; GaussianHaircut has 6, splats about 60 */
+#define MAX_NAME              32
 #define POINTS_WITHOUT_COUNTS 100
 
 enum type { I8, U8, I16, U16, I32, U32, F32, F64, N_TYPES };
@@ -35,13 +35,13 @@ struct element {
     enum role role;
     uint64_t n;
     int n_properties, n_lists;
-    uint32_t row_bytes;   /* of a binary row; the least where it has lists */
+    uint32_t row_bytes; /* of a binary row; the least where it has lists */
     struct property properties[MAX_PROPERTIES];
 };
 
 struct ply {
     struct reader *reader;
-    struct text text;     /* of the header, and of ascii data */
+    struct text text; /* of the header, and of ascii data */
     struct lines lines;
     int ascii, swap;
     int n_elements;
@@ -53,14 +53,20 @@ struct ply {
 
 /* --- header ----------------------------------------------------------------------------- */
 
-static groom_status refuse(struct ply *ply, const char *what) { return text_fail(&ply->text, what, ply->reader->diag); }
+static groom_status refuse(struct ply *ply, const char *what)
+{
+    return text_fail(&ply->text, what, ply->reader->diag);
+}
 
 static int type_of(const char *word, enum type *type)
 {
-    static const struct { const char *name; enum type type; } names[] = {
-        {"char", I8}, {"int8", I8}, {"uchar", U8}, {"uint8", U8}, {"short", I16}, {"int16", I16},
-        {"ushort", U16}, {"uint16", U16}, {"int", I32}, {"int32", I32}, {"uint", U32}, {"uint32", U32},
-        {"float", F32}, {"float32", F32}, {"double", F64}, {"float64", F64}};
+    static const struct {
+        const char *name;
+        enum type type;
+    } names[] = {{"char", I8},   {"int8", I8},     {"uchar", U8},   {"uint8", U8},
+                 {"short", I16}, {"int16", I16},   {"ushort", U16}, {"uint16", U16},
+                 {"int", I32},   {"int32", I32},   {"uint", U32},   {"uint32", U32},
+                 {"float", F32}, {"float32", F32}, {"double", F64}, {"float64", F64}};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
         if (strcmp(word, names[i].name) == 0) {
             *type = names[i].type;
@@ -89,8 +95,10 @@ static groom_status read_format(struct ply *ply)
 
 static enum role role_of(const char *name)
 {
-    return strcmp(name, "vertex") == 0 ? VERTEX : strcmp(name, "strand") == 0 ? STRAND
-         : strcmp(name, "edge") == 0 ? EDGE : OTHER;
+    return strcmp(name, "vertex") == 0   ? VERTEX
+           : strcmp(name, "strand") == 0 ? STRAND
+           : strcmp(name, "edge") == 0   ? EDGE
+                                         : OTHER;
 }
 
 static groom_status read_element(struct ply *ply)
@@ -128,7 +136,8 @@ static groom_status read_property(struct ply *ply)
     if (!next_word(ply, word, sizeof word))
         return refuse(ply, "the type of a property");
     if ((property->is_list = strcmp(word, "list") == 0)) {
-        if (!next_word(ply, word, sizeof word) || !type_of(word, &property->count_type) || property->count_type >= F32)
+        if (!next_word(ply, word, sizeof word) || !type_of(word, &property->count_type) ||
+            property->count_type >= F32)
             return refuse(ply, "a whole number's type for the count of a list");
         if (!next_word(ply, word, sizeof word))
             return refuse(ply, "the type of a list");
@@ -190,14 +199,23 @@ static double decode(const unsigned char *bytes, enum type type, int swap)
     for (size_t i = 0; i < size; i++)
         b[i] = bytes[swap ? size - 1 - i : i];
     switch (type) {
-    case I8: return (signed char)b[0];
-    case U8: return b[0];
-    case I16: return (int16_t)input_u16(b);
-    case U16: return input_u16(b);
-    case I32: return (int32_t)input_u32(b);
-    case U32: return input_u32(b);
-    case F32: return (double)input_f32(b);
-    default: memcpy(&wide, b, sizeof wide); return wide;
+    case I8:
+        return (signed char)b[0];
+    case U8:
+        return b[0];
+    case I16:
+        return (int16_t)input_u16(b);
+    case U16:
+        return input_u16(b);
+    case I32:
+        return (int32_t)input_u32(b);
+    case U32:
+        return input_u32(b);
+    case F32:
+        return (double)input_f32(b);
+    default:
+        memcpy(&wide, b, sizeof wide);
+        return wide;
     }
 }
 
@@ -208,7 +226,8 @@ static groom_status read_value(struct ply *ply, const struct element *element, e
         text_skip_space(&ply->text);
         return text_number(&ply->text, value) ? GROOM_OK : refuse(ply, element->name);
     }
-    groom_status status = input_take(ply->reader->in, type_size[type], element->name, &bytes, ply->reader->diag);
+    groom_status status =
+        input_take(ply->reader->in, type_size[type], element->name, &bytes, ply->reader->diag);
     if (status == GROOM_OK)
         *value = decode(bytes, type, ply->swap);
     return status;
@@ -230,7 +249,8 @@ static groom_status whole(struct ply *ply, const char *what, double value, uint6
     if (!(value >= 0 && value < (double)limit && value == floor(value)))
         return groom_fail_at(ply->reader->diag, GROOM_EFORMAT, (int64_t)offset(ply),
                              "%s before byte %llu is %g; a whole number from 0 to %llu was expected", what,
-                             (unsigned long long)offset(ply), value, (unsigned long long)(limit ? limit - 1 : 0));
+                             (unsigned long long)offset(ply), value,
+                             (unsigned long long)(limit ? limit - 1 : 0));
     *out = (uint32_t)value;
     return GROOM_OK;
 }
@@ -281,14 +301,16 @@ static groom_status check_element(struct ply *ply, const struct element *element
     uint64_t least = ply->ascii ? 2 * (uint64_t)element->n_properties - 1 : element->row_bytes;
     if (element->n_properties == 0 && element->n > 0)
         return groom_fail_at(ply->reader->diag, GROOM_EFORMAT, (int64_t)offset(ply),
-                             "element %s has %llu rows without a property", element->name, (unsigned long long)element->n);
+                             "element %s has %llu rows without a property", element->name,
+                             (unsigned long long)element->n);
     if (remaining < 0 || element->n == 0)
         return GROOM_OK;
     if (element->n > ((uint64_t)remaining + 1) / least)
-        return groom_fail_at(ply->reader->diag, GROOM_ETRUNCATED, (int64_t)offset(ply),
-                             "%llu rows of element %s need at least %llu bytes each from byte %llu on, where %llu are left",
-                             (unsigned long long)element->n, element->name, (unsigned long long)least,
-                             (unsigned long long)offset(ply), (unsigned long long)remaining);
+        return groom_fail_at(
+            ply->reader->diag, GROOM_ETRUNCATED, (int64_t)offset(ply),
+            "%llu rows of element %s need at least %llu bytes each from byte %llu on, where %llu are left",
+            (unsigned long long)element->n, element->name, (unsigned long long)least,
+            (unsigned long long)offset(ply), (unsigned long long)remaining);
     return GROOM_OK;
 }
 
@@ -342,10 +364,13 @@ static groom_status read_vertices(struct ply *ply, const struct element *element
 /* The property that counts, and how many points a strand has more than it says. */
 static int find_count(const struct element *element, uint32_t *extra)
 {
-    static const struct { const char *name; uint32_t extra; } names[] = {
-        {"nsegs", 1}, {"n_segs", 1}, {"nsegments", 1}, {"n_segments", 1}, {"num_segments", 1}, {"segments", 1},
-        {"nverts", 0}, {"n_verts", 0}, {"nvertices", 0}, {"n_vertices", 0}, {"num_vertices", 0},
-        {"npoints", 0}, {"n_points", 0}, {"num_points", 0}, {"points", 0}, {"count", 0}};
+    static const struct {
+        const char *name;
+        uint32_t extra;
+    } names[] = {{"nsegs", 1},        {"n_segs", 1},     {"nsegments", 1},    {"n_segments", 1},
+                 {"num_segments", 1}, {"segments", 1},   {"nverts", 0},       {"n_verts", 0},
+                 {"nvertices", 0},    {"n_vertices", 0}, {"num_vertices", 0}, {"npoints", 0},
+                 {"n_points", 0},     {"num_points", 0}, {"points", 0},       {"count", 0}};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         int property = find_property(element, names[i].name);
         *extra = names[i].extra;
@@ -361,12 +386,13 @@ static groom_status cut_strand(struct ply *ply, double value, uint32_t extra)
     groom_status status = whole(ply, "the count of a strand", value, UINT64_C(1) << 31, &count);
     if (status != GROOM_OK)
         return status;
-    uint64_t n = (uint64_t)count + extra, waiting = ply->strands_found ? builder_waiting(ply->reader->out) : 0;
+    uint64_t n = (uint64_t)count + extra,
+             waiting = ply->strands_found ? builder_waiting(ply->reader->out) : 0;
     if (n > waiting)
         return groom_fail_at(ply->reader->diag, GROOM_EFORMAT, (int64_t)offset(ply),
                              "the strand before byte %llu has %llu vertices, where %llu of %llu are left",
-                             (unsigned long long)offset(ply), (unsigned long long)n, (unsigned long long)waiting,
-                             (unsigned long long)ply->n_vertices);
+                             (unsigned long long)offset(ply), (unsigned long long)n,
+                             (unsigned long long)waiting, (unsigned long long)ply->n_vertices);
     return builder_cut(ply->reader->out, n) ? GROOM_OK : out_of_builder(ply);
 }
 
@@ -379,8 +405,9 @@ static groom_status read_strands(struct ply *ply, const struct element *element)
         return groom_fail_at(ply->reader->diag, GROOM_EFORMAT, (int64_t)offset(ply),
                              "element \"strand\" was expected once, after \"vertex\" and before \"edge\"");
     if (property < 0 && element->n_lists != 1)
-        return groom_fail_at(ply->reader->diag, GROOM_EFORMAT, (int64_t)offset(ply),
-                             "element \"strand\" has no property that counts (nsegs, nverts or a list of vertex indices)");
+        return groom_fail_at(
+            ply->reader->diag, GROOM_EFORMAT, (int64_t)offset(ply),
+            "element \"strand\" has no property that counts (nsegs, nverts or a list of vertex indices)");
     ply->strands_found = 1;
     for (uint64_t i = 0; status == GROOM_OK && i < element->n; i++) {
         status = read_row(ply, element);
@@ -429,10 +456,13 @@ static groom_status cut_uniformly(struct ply *ply)
                              "%llu faces and no strands: this is a mesh; upload it as a head",
                              (unsigned long long)ply->n_faces);
     if (n == 0 || n % POINTS_WITHOUT_COUNTS != 0)
-        return groom_fail_at(ply->reader->diag, GROOM_EFORMAT, (int64_t)offset(ply),
-                             "%llu vertices without an element \"strand\" or \"edge\": a multiple of %d was expected, "
-                             "as many a strand", (unsigned long long)n, POINTS_WITHOUT_COUNTS);
-    report_warn(ply->reader->report, "the file does not say where strands begin: %d points a strand were taken",
+        return groom_fail_at(
+            ply->reader->diag, GROOM_EFORMAT, (int64_t)offset(ply),
+            "%llu vertices without an element \"strand\" or \"edge\": a multiple of %d was expected, "
+            "as many a strand",
+            (unsigned long long)n, POINTS_WITHOUT_COUNTS);
+    report_warn(ply->reader->report,
+                "the file does not say where strands begin: %d points a strand were taken",
                 POINTS_WITHOUT_COUNTS);
     for (uint64_t i = 0; status == GROOM_OK && i < n / POINTS_WITHOUT_COUNTS; i++)
         status = builder_cut(ply->reader->out, POINTS_WITHOUT_COUNTS) ? GROOM_OK : out_of_builder(ply);
@@ -449,10 +479,14 @@ static groom_status read_rows(struct ply *ply, const struct element *element)
     if (status != GROOM_OK)
         return status;
     switch (element->role) {
-    case VERTEX: return read_vertices(ply, element);
-    case STRAND: return read_strands(ply, element);
-    case EDGE: return read_edges(ply, element);
-    default: break;
+    case VERTEX:
+        return read_vertices(ply, element);
+    case STRAND:
+        return read_strands(ply, element);
+    case EDGE:
+        return read_edges(ply, element);
+    default:
+        break;
     }
     for (uint64_t i = 0; status == GROOM_OK && i < element->n; i++)
         status = read_row(ply, element);

@@ -36,7 +36,8 @@ static groom_status read_header(struct reader *reader, struct tfx_header *header
     groom_status status = input_take(reader->in, bytes, "the .tfx header", &b, reader->diag);
     if (status != GROOM_OK)
         return status;
-    *header = (struct tfx_header){input_u32(b + 4), input_u32(b + 8), input_u32(b + 12), input_u32(b + 16), 16, bytes};
+    *header = (struct tfx_header){
+        input_u32(b + 4), input_u32(b + 8), input_u32(b + 12), input_u32(b + 16), 16, bytes};
     if (version == 3.0f) {
         header->positions = input_u32(b + 144);
         header->strand_uv = input_u32(b + 152);
@@ -52,8 +53,8 @@ static groom_status read_header(struct reader *reader, struct tfx_header *header
 static groom_status read_positions(struct reader *reader, const struct tfx_header *header)
 {
     uint64_t n = (uint64_t)header->n_strands * header->n_vertices;
-    groom_status status = input_skip(reader->in, header->positions - input_offset(reader->in),
-                                     "the positions", reader->diag);
+    groom_status status =
+        input_skip(reader->in, header->positions - input_offset(reader->in), "the positions", reader->diag);
     if (status == GROOM_OK && n > UINT32_MAX)
         return groom_fail_at(reader->diag, GROOM_ETOOBIG, 4, "%u strands of %u vertices are more than 2^32-1",
                              header->n_strands, header->n_vertices);
@@ -76,11 +77,13 @@ static groom_status read_strand_uv(struct reader *reader, const struct tfx_heade
         report_warn(reader->report, "the strands' texture coordinates stand before the positions: not read");
         return GROOM_OK;
     }
-    status = input_skip(reader->in, header->strand_uv - input_offset(reader->in), "texture coordinates", reader->diag);
+    status = input_skip(reader->in, header->strand_uv - input_offset(reader->in), "texture coordinates",
+                        reader->diag);
     for (uint32_t i = 0; i < header->n_strands && status == GROOM_OK;) {
         const unsigned char *uv;
         size_t n;
-        status = input_records(reader->in, 8, header->n_strands - i, "texture coordinates", &uv, &n, reader->diag);
+        status =
+            input_records(reader->in, 8, header->n_strands - i, "texture coordinates", &uv, &n, reader->diag);
         for (size_t j = 0; status == GROOM_OK && j < n; j++, i++)
             if (!builder_root_uv(reader->out, input_f32(uv + 8 * j), input_f32(uv + 8 * j + 4)))
                 return builder_fail(reader->out, input_offset(reader->in), reader->diag);
@@ -95,8 +98,8 @@ static groom_status read_binary(struct reader *reader)
     if (status != GROOM_OK)
         return status;
     if (header.n_strands > 0 && header.n_vertices < 2)
-        return groom_fail_at(reader->diag, GROOM_EFORMAT, 8, "strands of %u vertices (byte 8); 2 are the least",
-                             header.n_vertices);
+        return groom_fail_at(reader->diag, GROOM_EFORMAT, 8,
+                             "strands of %u vertices (byte 8); 2 are the least", header.n_vertices);
     reader->out->keeps_root_uv = header.strand_uv != 0;
     if ((status = read_positions(reader, &header)) != GROOM_OK)
         return status;
@@ -123,7 +126,8 @@ static groom_status expect_number(struct text *text, const char *what, double *v
     return text_number(text, value) ? GROOM_OK : text_fail(text, what, diag);
 }
 
-static groom_status expect_count(struct text *text, const char *what, long long *value, struct groom_diag *diag)
+static groom_status expect_count(struct text *text, const char *what, long long *value,
+                                 struct groom_diag *diag)
 {
     text_skip_space(text);
     text_ready(text);
@@ -171,7 +175,8 @@ static groom_status read_text_strand(struct reader *reader, struct text *text)
     }
     if ((status = read_text_vertices(reader, text, n)) != GROOM_OK)
         return status;
-    return builder_cut(reader->out, (uint64_t)n) ? GROOM_OK : builder_fail(reader->out, text_offset(text), reader->diag);
+    return builder_cut(reader->out, (uint64_t)n) ? GROOM_OK
+                                                 : builder_fail(reader->out, text_offset(text), reader->diag);
 }
 
 /* "name value ..." lines up to the first strand */
@@ -200,7 +205,8 @@ static groom_status read_text(struct reader *reader, struct text *text)
     long long n_strands, n_read = 0;
     groom_status status;
     reader->out->keeps_root_uv = 1;
-    if ((status = expect_word(text, "version", reader->diag)) != GROOM_OK || /* the text 2, or the float 3 or 4 */
+    if ((status = expect_word(text, "version", reader->diag)) !=
+            GROOM_OK || /* the text 2, or the float 3 or 4 */
         (status = read_text_header(reader, text, &n_strands)) != GROOM_OK)
         return status;
     for (text_skip_space(text); text_peek(text) >= 0; text_skip_space(text), n_read++)
@@ -210,7 +216,8 @@ static groom_status read_text(struct reader *reader, struct text *text)
     if (reader->in->status != GROOM_OK || n_read < n_strands)
         return input_fail(reader->in, "the next strand", reader->diag);
     if (n_strands >= 0 && n_read != n_strands)
-        report_warn(reader->report, "the header promises %lld strands, the file holds %lld", n_strands, n_read);
+        report_warn(reader->report, "the header promises %lld strands, the file holds %lld", n_strands,
+                    n_read);
     return GROOM_OK;
 }
 

@@ -19,7 +19,8 @@ read_function read_hair, read_monohair, read_data, read_ct2hair, read_ply, read_
     read_npy, read_npz;
 
 /* n points of three floats, `stride` bytes apart, from the input into the builder. */
-GROOM_MUST_CHECK groom_status read_points_f32(struct reader *reader, uint64_t n, size_t stride, const char *what);
+GROOM_MUST_CHECK groom_status read_points_f32(struct reader *reader, uint64_t n, size_t stride,
+                                              const char *what);
 /* The next n points are a strand. */
 GROOM_MUST_CHECK groom_status read_cut(struct reader *reader, uint64_t n);
 /* Refuse counts that the bytes still to come cannot hold, and more than the limit; where they can,

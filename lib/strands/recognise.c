@@ -26,7 +26,7 @@
 
 #include "strands/input.h"
 
-#define MANY_STRANDS (1u << 24)
+#define MANY_STRANDS  (1u << 24)
 #define MANY_VERTICES (1u << 20)
 
 struct bytes {
@@ -42,18 +42,25 @@ static int starts(const struct bytes *bytes, const char *word)
 }
 
 static struct recognised certain(groom_format format) { return (struct recognised){format, 1, 0, NULL}; }
-static struct recognised unknown(const char *hint) { return (struct recognised){GROOM_FORMAT_AUTO, 0, 0, hint}; }
+static struct recognised unknown(const char *hint)
+{
+    return (struct recognised){GROOM_FORMAT_AUTO, 0, 0, hint};
+}
 
 /* --- 1: magic numbers ------------------------------------------------------------------ */
 
 static int by_magic(const struct bytes *bytes, struct recognised *found)
 {
-    static const struct { const char *magic, *hint; } others[] = {
+    static const struct {
+        const char *magic, *hint;
+    } others[] = {
         {"Ogawa", "this is Alembic, which is not read: export the strands as HAIR, PLY, OBJ or JSON"},
-        {"\x89HDF", "this is HDF5 (or old Alembic), which is not read: export the strands as HAIR, PLY, OBJ or JSON"},
+        {"\x89HDF",
+         "this is HDF5 (or old Alembic), which is not read: export the strands as HAIR, PLY, OBJ or JSON"},
         {"#usda", "this is USD, which is written but not read: export the strands as HAIR, PLY, OBJ or JSON"},
         {"PXR-USDC", "this is USD, which is not read: export the strands as HAIR, PLY, OBJ or JSON"},
-        {"requires maya", "this is a Maya scene, which is not read: export the strands as HAIR, PLY, OBJ or JSON"},
+        {"requires maya",
+         "this is a Maya scene, which is not read: export the strands as HAIR, PLY, OBJ or JSON"},
         {"//Maya", "this is a Maya scene, which is not read: export the strands as HAIR, PLY, OBJ or JSON"},
         {"Kaydara FBX", "this is FBX, which is not read: export the strands as HAIR, PLY, OBJ or JSON"},
         {"glTF", "this is glTF, which is not read: export the strands as HAIR, PLY, OBJ or JSON"},
@@ -87,8 +94,8 @@ static int is_text(const struct bytes *bytes)
 
 static int is_obj(const unsigned char *p, const unsigned char *end)
 {
-    static const char *const statements[] = {"v", "vn", "vt", "vp", "l", "f", "p", "o", "g", "s",
-                                             "mtllib", "usemtl", "cstype", "deg"};
+    static const char *const statements[] = {"v", "vn", "vt", "vp",     "l",      "f",      "p",
+                                             "o", "g",  "s",  "mtllib", "usemtl", "cstype", "deg"};
     size_t n = 0;
     if (*p == '#')
         return 1;
@@ -117,8 +124,10 @@ static int by_text(const struct bytes *bytes, struct recognised *found)
         return *found = certain(GROOM_FORMAT_TFX), 1;
     if (is_obj(p, end))
         return *found = certain(GROOM_FORMAT_OBJ), 1;
-    return *found = unknown("this is text, but neither JSON nor OBJ nor .tfx 2: \"{\", \"[\", \"v\", \"#\" or "
-                            "\"version\" was expected at byte 0"), 1;
+    return *found =
+               unknown("this is text, but neither JSON nor OBJ nor .tfx 2: \"{\", \"[\", \"v\", \"#\" or "
+                       "\"version\" was expected at byte 0"),
+           1;
 }
 
 /* --- 3: counts that fit -------------------------------------------------------------------- */
@@ -183,8 +192,10 @@ static uint64_t walk_records(const struct bytes *bytes, uint32_t stride)
 
 static struct recognised by_counts(const struct bytes *bytes)
 {
-    static const struct { uint32_t stride; groom_format format; } layouts[] = {
-        {12, GROOM_FORMAT_DATA}, {16, GROOM_FORMAT_DATA}, {28, GROOM_FORMAT_CT2HAIR}};
+    static const struct {
+        uint32_t stride;
+        groom_format format;
+    } layouts[] = {{12, GROOM_FORMAT_DATA}, {16, GROOM_FORMAT_DATA}, {28, GROOM_FORMAT_CT2HAIR}};
     struct recognised found = {GROOM_FORMAT_AUTO, 0, 0, NULL};
     uint64_t best = 0;
     if (is_monohair(bytes))

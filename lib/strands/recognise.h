@@ -5,10 +5,10 @@
 #include "groom/format.h"
 
 struct recognised {
-    groom_format format;    /* GROOM_FORMAT_AUTO: none that is read here */
-    int certain;            /* by a magic number or text; otherwise by counts that fit */
-    uint32_t stride;        /* of .data records: bytes a point (12, or 16 with visibility) */
-    const char *hint;       /* what it is instead, and what to do, or NULL */
+    groom_format format; /* GROOM_FORMAT_AUTO: none that is read here */
+    int certain;         /* by a magic number or text; otherwise by counts that fit */
+    uint32_t stride;     /* of .data records: bytes a point (12, or 16 with visibility) */
+    const char *hint;    /* what it is instead, and what to do, or NULL */
 };
 
 /* bytes   the first n of the file (all of it where n == size)

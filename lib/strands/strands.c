@@ -31,14 +31,14 @@ static uint32_t strand_vertices(const struct groom_strands *strands, uint32_t st
 
 static const float (*strand_points(const struct groom_strands *strands, uint32_t strand))[3]
 {
-    return (const float (*)[3])(strands->points + strands->first[strand]);
+    return (const float(*)[3])(strands->points + strands->first[strand]);
 }
 
 /* --- the container ------------------------------------------------------------ */
 
 groom_status groom_strands_create(uint64_t n_strands, uint64_t n_vertices,
-                                  const struct groom_context *context,
-                                  struct groom_strands **out, struct groom_diag *diag)
+                                  const struct groom_context *context, struct groom_strands **out,
+                                  struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     struct groom_strands *strands;
@@ -137,9 +137,8 @@ static void resample_piece(void *user, uint32_t piece, uint32_t thread)
                         work->out + (size_t)i * work->n_vertices, work->n_vertices);
 }
 
-groom_status groom_strands_resample(const struct groom_strands *in, uint32_t n_vertices,
-                                    float (*out)[3], const struct groom_context *context,
-                                    struct groom_diag *diag)
+groom_status groom_strands_resample(const struct groom_strands *in, uint32_t n_vertices, float (*out)[3],
+                                    const struct groom_context *context, struct groom_diag *diag)
 {
     if (n_vertices < 2)
         return groom_fail(diag, GROOM_EINVAL, "%u vertices a strand asked for; 2 is the least", n_vertices);
@@ -165,8 +164,8 @@ static void measure_piece(void *user, uint32_t piece, uint32_t thread)
     uint32_t end = piece_end(piece, work->strands->n_strands);
     (void)thread;
     for (uint32_t i = piece_begin(piece); i < end; i++)
-        work->length[i] = (float)groom_polyline_length(strand_points(work->strands, i),
-                                                       strand_vertices(work->strands, i));
+        work->length[i] =
+            (float)groom_polyline_length(strand_points(work->strands, i), strand_vertices(work->strands, i));
 }
 
 static int compare_floats(const void *a, const void *b)
@@ -189,8 +188,7 @@ static void bounding_box(const struct groom_strands *strands, float min[3], floa
         }
 }
 
-groom_status groom_strands_summarize(const struct groom_strands *strands,
-                                     const struct groom_context *context,
+groom_status groom_strands_summarize(const struct groom_strands *strands, const struct groom_context *context,
                                      struct groom_strands_summary *summary, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);

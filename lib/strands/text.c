@@ -99,8 +99,10 @@ groom_status text_fail(struct text *text, const char *what, struct groom_diag *d
     }
     uint64_t offset = text_offset(text);
     if (n)
-        return groom_fail_at(diag, GROOM_EFORMAT, (int64_t)offset, "%s was expected at byte %llu, where \"%s\" stands",
-                             what, (unsigned long long)offset, found);
-    return groom_fail_at(diag, GROOM_EFORMAT, (int64_t)offset, "%s was expected at byte %llu, where byte 0x%02x stands",
-                         what, (unsigned long long)offset, (unsigned)c);
+        return groom_fail_at(diag, GROOM_EFORMAT, (int64_t)offset,
+                             "%s was expected at byte %llu, where \"%s\" stands", what,
+                             (unsigned long long)offset, found);
+    return groom_fail_at(diag, GROOM_EFORMAT, (int64_t)offset,
+                         "%s was expected at byte %llu, where byte 0x%02x stands", what,
+                         (unsigned long long)offset, (unsigned)c);
 }

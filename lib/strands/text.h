@@ -15,7 +15,7 @@ struct text {
 };
 
 void text_begin(struct text *text, struct input *in);
-void text_end(struct text *text);     /* hand the position back to the input */
+void text_end(struct text *text); /* hand the position back to the input */
 void text_refill(struct text *text);
 
 /* A token that begins here is whole in the window (unless it is longer than TEXT_LOOKAHEAD). */
@@ -46,7 +46,8 @@ void text_skip_space(struct text *text);
 void text_skip_blank(struct text *text);
 void text_skip_line(struct text *text);
 
-/* A word: bytes that are not blank, at most capacity - 1 of them, zero-terminated; 0 where none or too long. */
+/* A word: bytes that are not blank, at most capacity - 1 of them, zero-terminated; 0 where none or too long.
+ */
 size_t text_word(struct text *text, char *word, size_t capacity);
 
 /* A number here, "nan" and "inf" among them. 0: none, or one longer than TEXT_LOOKAHEAD. */

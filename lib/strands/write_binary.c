@@ -71,7 +71,8 @@ size_t writer_ply_header(char out[WRITER_PLY_HEADER_MAX], uint32_t n_strands, ui
                             "element vertex %llu\nproperty float x\nproperty float y\nproperty float z\n"
                             "element strand %u\nproperty ushort nsegs\n"
                             "element edge %llu\nproperty int vertex1\nproperty int vertex2\nend_header\n",
-                            (unsigned long long)n_vertices, n_strands, (unsigned long long)(n_vertices - n_strands));
+                            (unsigned long long)n_vertices, n_strands,
+                            (unsigned long long)(n_vertices - n_strands));
 }
 
 static groom_status begin_ply(struct groom_writer *writer)

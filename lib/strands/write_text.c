@@ -79,7 +79,9 @@ const struct writer_format writer_obj = {begin_obj, points_obj, NULL, 1, UINT32_
 static groom_status write_counts(struct groom_writer *writer)
 {
     for (uint32_t i = 0; i < writer->n_strands; i++) {
-        groom_status status = writer_integers(writer, writer_count(writer, i), 1, i ? ',' : ' ');
+        char text[24] = ",";
+        size_t n = 1 + number_print_integer(text + 1, writer_count(writer, i)), skip = i == 0;
+        groom_status status = writer_bytes(writer, text + skip, n - skip);
         if (status != GROOM_OK)
             return status;
     }
@@ -125,11 +127,13 @@ static groom_status finish_usda(struct groom_writer *writer)
 {
     char end[512];
     double half = writer->width / 2;
-    int n = snprintf(end, sizeof end, "]\n    float[] widths = [%.9g] (\n        interpolation = \"constant\"\n    )\n",
+    int n = snprintf(end, sizeof end,
+                     "]\n    float[] widths = [%.9g] (\n        interpolation = \"constant\"\n    )\n",
                      writer->width);
     if (writer->n_vertices > 0)
-        n += snprintf(end + n, sizeof end - (size_t)n, "    float3[] extent = [(%.9g,%.9g,%.9g),(%.9g,%.9g,%.9g)]\n",
-                      writer->min[0] - half, writer->min[1] - half, writer->min[2] - half, writer->max[0] + half,
+        n += snprintf(end + n, sizeof end - (size_t)n,
+                      "    float3[] extent = [(%.9g,%.9g,%.9g),(%.9g,%.9g,%.9g)]\n", writer->min[0] - half,
+                      writer->min[1] - half, writer->min[2] - half, writer->max[0] + half,
                       writer->max[1] + half, writer->max[2] + half);
     snprintf(end + n, sizeof end - (size_t)n, "}\n");
     return writer_text(writer, end);

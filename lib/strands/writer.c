@@ -11,8 +11,9 @@
 #define DEFAULT_WIDTH_M 0.00008
 
 static const struct writer_format *const formats[GROOM_FORMAT_COUNT] = {
-    [GROOM_FORMAT_HAIR] = &writer_hair, [GROOM_FORMAT_DATA] = &writer_data, [GROOM_FORMAT_PLY] = &writer_ply,
-    [GROOM_FORMAT_OBJ] = &writer_obj,   [GROOM_FORMAT_JSON] = &writer_json, [GROOM_FORMAT_USDA] = &writer_usda};
+    [GROOM_FORMAT_HAIR] = &writer_hair, [GROOM_FORMAT_DATA] = &writer_data,
+    [GROOM_FORMAT_PLY] = &writer_ply,   [GROOM_FORMAT_OBJ] = &writer_obj,
+    [GROOM_FORMAT_JSON] = &writer_json, [GROOM_FORMAT_USDA] = &writer_usda};
 
 /* --- buffer -------------------------------------------------------------------------- */
 
@@ -57,7 +58,8 @@ groom_status writer_text(struct groom_writer *writer, const char *text)
 /* --- points --------------------------------------------------------------------------- */
 
 /* Packed floats in the file's frame, in loops that the compiler vectorizes. */
-static void convert_packed(const struct groom_writer *writer, float *restrict out, const float (*restrict points)[3], size_t n)
+static void convert_packed(const struct groom_writer *writer, float *restrict out,
+                           const float (*restrict points)[3], size_t n)
 {
     const float *in = points[0];
     double per_metre = writer->per_metre;
@@ -130,14 +132,14 @@ static groom_status check_layout(struct groom_writer *writer, groom_format forma
     for (uint32_t i = 0; i < writer->n_strands; i++) {
         uint32_t n = writer_count(writer, i);
         if (n < 2 || n > writer->format->max_vertices)
-            return groom_fail(diag, GROOM_EINVAL, "strand %u has %u vertices; %s holds strands of 2 to %u", i, n,
-                              groom_format_name(format), writer->format->max_vertices);
+            return groom_fail(diag, GROOM_EINVAL, "strand %u has %u vertices; %s holds strands of 2 to %u", i,
+                              n, groom_format_name(format), writer->format->max_vertices);
         writer->n_vertices += n;
     }
     if (writer->n_vertices > writer->format->max_total || writer->n_strands > INT32_MAX)
         return groom_fail(diag, GROOM_EINVAL, "%llu vertices in %u strands; %s holds %u vertices at most",
-                          (unsigned long long)writer->n_vertices, writer->n_strands, groom_format_name(format),
-                          writer->format->max_total);
+                          (unsigned long long)writer->n_vertices, writer->n_strands,
+                          groom_format_name(format), writer->format->max_total);
     return GROOM_OK;
 }
 
@@ -147,9 +149,9 @@ static groom_status fail(struct groom_diag *diag, groom_status status)
 }
 
 groom_status groom_writer_create(const struct groom_write_options *options, uint32_t n_strands,
-                                 const uint32_t *vertex_counts, uint32_t uniform_count, struct groom_sink sink,
-                                 const struct groom_context *context, struct groom_writer **out,
-                                 struct groom_diag *diag)
+                                 const uint32_t *vertex_counts, uint32_t uniform_count,
+                                 struct groom_sink sink, const struct groom_context *context,
+                                 struct groom_writer **out, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     double unit_m = options->frame.unit_m > 0 ? options->frame.unit_m : 1;
@@ -224,8 +226,10 @@ groom_status groom_writer_points(struct groom_writer *writer, const float (*poin
     groom_status status;
     if (n > writer->n_vertices - writer->n_written)
         return groom_fail(diag, GROOM_EINVAL, "%zu more points than the %llu of the layout",
-                          n - (size_t)(writer->n_vertices - writer->n_written), (unsigned long long)writer->n_vertices);
-    status = writer->format->by_strand ? write_by_strand(writer, points, n) : writer->format->points(writer, points, n);
+                          n - (size_t)(writer->n_vertices - writer->n_written),
+                          (unsigned long long)writer->n_vertices);
+    status = writer->format->by_strand ? write_by_strand(writer, points, n)
+                                       : writer->format->points(writer, points, n);
     if (status == GROOM_EINVAL)
         return groom_fail(diag, status, "a coordinate is not finite, which a text format cannot say");
     if (status != GROOM_OK)
@@ -252,12 +256,15 @@ int64_t groom_writer_size(groom_format format, uint32_t n_strands, uint64_t n_ve
     char header[WRITER_PLY_HEADER_MAX];
     int64_t strands = n_strands, vertices = (int64_t)n_vertices;
     switch (format) {
-    case GROOM_FORMAT_HAIR: return 128 + 2 * strands + 12 * vertices;
-    case GROOM_FORMAT_DATA: return 4 + 4 * strands + 12 * vertices;
+    case GROOM_FORMAT_HAIR:
+        return 128 + 2 * strands + 12 * vertices;
+    case GROOM_FORMAT_DATA:
+        return 4 + 4 * strands + 12 * vertices;
     case GROOM_FORMAT_PLY:
         return (int64_t)writer_ply_header(header, n_strands, n_vertices) + 2 * strands + 12 * vertices +
                8 * (vertices - strands);
-    default: return -1;
+    default:
+        return -1;
     }
 }
 
@@ -275,8 +282,9 @@ static groom_status make_counts(const struct groom_strands *strands, const struc
     return GROOM_OK;
 }
 
-groom_status groom_strands_write(const struct groom_strands *strands, const struct groom_write_options *options,
-                                 struct groom_sink sink, const struct groom_context *context, struct groom_diag *diag)
+groom_status groom_strands_write(const struct groom_strands *strands,
+                                 const struct groom_write_options *options, struct groom_sink sink,
+                                 const struct groom_context *context, struct groom_diag *diag)
 {
     enum { AT_ONCE = 1 << 18 }; /* points between two looks at the clock of the caller */
     const struct groom_allocator *allocator = memory_allocator(context);
@@ -288,7 +296,7 @@ groom_status groom_strands_write(const struct groom_strands *strands, const stru
     status = groom_writer_create(options, strands->n_strands, counts, 0, sink, context, &writer, diag);
     for (uint32_t i = 0, n; status == GROOM_OK && i < strands->n_vertices; i += n) {
         n = strands->n_vertices - i < AT_ONCE ? strands->n_vertices - i : AT_ONCE;
-        status = groom_writer_points(writer, (const float (*)[3])(strands->points + i), n, diag);
+        status = groom_writer_points(writer, (const float(*)[3])(strands->points + i), n, diag);
         progress_report(context, (double)(i + n) / strands->n_vertices);
     }
     if (status == GROOM_OK)

@@ -7,7 +7,7 @@
 
 #include "groom/format.h"
 
-#define WRITER_BUFFER 65536
+#define WRITER_BUFFER    65536
 #define WRITER_MAX_PIECE 256 /* writer_room gives at most this much */
 
 /* One a format. Points come in runs; where by_strand is set, a run is part of one strand. */
@@ -28,13 +28,13 @@ struct groom_writer {
     double unit_m, per_metre; /* metres in a unit of the file, and the reverse */
     double width;             /* in the file's unit */
     groom_up up;
-    int is_plain;             /* metres and y up: nothing to convert */
+    int is_plain; /* metres and y up: nothing to convert */
     uint32_t n_strands, uniform_count;
     const uint32_t *vertex_counts; /* [n_strands] or NULL */
     uint64_t n_vertices, n_written;
-    uint32_t strand, in_strand;    /* by_strand: the present strand, and how many of its points are written */
-    uint64_t first_of_strand;      /* OBJ: vertices before the present strand */
-    float min[3], max[3];          /* of the points as written (USD) */
+    uint32_t strand, in_strand; /* by_strand: the present strand, and how many of its points are written */
+    uint64_t first_of_strand;   /* OBJ: vertices before the present strand */
+    float min[3], max[3];       /* of the points as written (USD) */
     size_t used;
     unsigned char buffer[WRITER_BUFFER];
 };
@@ -58,10 +58,12 @@ static inline void writer_convert(const struct groom_writer *writer, float out[3
     out[2] = writer->is_plain ? z : (float)(z * writer->per_metre);
 }
 /* Points as three little-endian floats each. */
-GROOM_MUST_CHECK groom_status writer_points_f32(struct groom_writer *writer, const float (*points)[3], size_t n);
+GROOM_MUST_CHECK groom_status writer_points_f32(struct groom_writer *writer, const float (*points)[3],
+                                                size_t n);
 /* "a SEPARATOR b SEPARATOR c" into out; 0 where a value is not finite. */
 size_t writer_print_point(const struct groom_writer *writer, char *out, const float point[3], char separator);
-GROOM_MUST_CHECK groom_status writer_integers(struct groom_writer *writer, uint64_t first, uint64_t n, char separator);
+GROOM_MUST_CHECK groom_status writer_integers(struct groom_writer *writer, uint64_t first, uint64_t n,
+                                              char separator);
 
 /* The text before the data of a binary PLY; returns its length. */
 #define WRITER_PLY_HEADER_MAX 512

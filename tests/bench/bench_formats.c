@@ -59,13 +59,15 @@ static groom_status copy_bytes(void *user, const void *bytes, size_t n)
     return GROOM_OK;
 }
 
-static double write_seconds(const struct groom_strands *strands, const struct groom_write_options *options, struct counter *counter)
+static double write_seconds(const struct groom_strands *strands, const struct groom_write_options *options,
+                            struct counter *counter)
 {
     double best = INFINITY;
     for (int round = 0; round < ROUNDS; round++) {
         double start = seconds();
         counter->n = 0;
-        require(groom_strands_write(strands, options, (struct groom_sink){copy_bytes, counter}, NULL, NULL), "write");
+        require(groom_strands_write(strands, options, (struct groom_sink){copy_bytes, counter}, NULL, NULL),
+                "write");
         best = fmin(best, seconds() - start);
     }
     return best;
@@ -117,22 +119,25 @@ static double cjson_mb_per_s(const unsigned char *bytes, size_t n)
     return (double)cut * 1e-6 / spent;
 }
 
-static void bench_format(const struct groom_strands *strands, groom_format format, struct counter *counter, unsigned char *spare)
+static void bench_format(const struct groom_strands *strands, groom_format format, struct counter *counter,
+                         unsigned char *spare)
 {
-    struct groom_write_options options = {.format = format}, converted = {.format = format, .frame = {0.01, GROOM_UP_Z}};
+    struct groom_write_options options = {.format = format},
+                               converted = {.format = format, .frame = {0.01, GROOM_UP_Z}};
     const char *name = groom_format_name(format);
     double in_cm = write_seconds(strands, &converted, counter);
     double spent = write_seconds(strands, &options, counter), mb = (double)counter->n * 1e-6;
     double copy = copy_seconds(spare, counter->out, counter->n);
-    printf("figure %s_write_mb_per_s %.0f MB/s %.2f of memcpy's speed; in cm and z up %.0f MB/s\n", name, mb / spent,
-           copy / spent, mb / in_cm);
+    printf("figure %s_write_mb_per_s %.0f MB/s %.2f of memcpy's speed; in cm and z up %.0f MB/s\n", name,
+           mb / spent, copy / spent, mb / in_cm);
     if (!groom_format_readable(format))
         return;
     double read = read_seconds(counter->out, counter->n);
     if (format == GROOM_FORMAT_JSON) {
         double other = cjson_mb_per_s(counter->out, counter->n);
-        printf("figure json_parse_mb_per_s %.0f MB/s %.1f times cJSON's %.0f MB/s; %.1f M vertices a second\n", mb / read,
-               mb / read / other, other, N_STRANDS * M * 1e-6 / read);
+        printf(
+            "figure json_parse_mb_per_s %.0f MB/s %.1f times cJSON's %.0f MB/s; %.1f M vertices a second\n",
+            mb / read, mb / read / other, other, N_STRANDS * M * 1e-6 / read);
     } else {
         printf("figure %s_read_mb_per_s %.0f MB/s %.2f of memcpy's speed\n", name, mb / read, copy / read);
     }
@@ -140,8 +145,8 @@ static void bench_format(const struct groom_strands *strands, groom_format forma
 
 int main(void)
 {
-    static const groom_format formats[] = {GROOM_FORMAT_HAIR, GROOM_FORMAT_DATA, GROOM_FORMAT_PLY, GROOM_FORMAT_OBJ,
-                                           GROOM_FORMAT_JSON, GROOM_FORMAT_USDA};
+    static const groom_format formats[] = {GROOM_FORMAT_HAIR, GROOM_FORMAT_DATA, GROOM_FORMAT_PLY,
+                                           GROOM_FORMAT_OBJ,  GROOM_FORMAT_JSON, GROOM_FORMAT_USDA};
     struct groom_strands *strands = make_strands();
     size_t room = (size_t)strands->n_vertices * 64;
     struct counter counter = {malloc(room), 0};

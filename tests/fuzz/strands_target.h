@@ -53,13 +53,15 @@ static void fuzz_check_answer(const struct fuzz_answer *answer)
     const struct groom_strands *strands = answer->strands;
     fuzz_check((answer->status == GROOM_OK) == (strands != NULL));
     if (!strands) {
-        fuzz_check(answer->diag.status == answer->status && answer->diag.detail[0] && answer->diag.byte_offset >= 0);
+        fuzz_check(answer->diag.status == answer->status && answer->diag.detail[0] &&
+                   answer->diag.byte_offset >= 0);
         return;
     }
-    fuzz_check(strands->n_strands > 0 && strands->first[0] == 0 && strands->first[strands->n_strands] == strands->n_vertices);
+    fuzz_check(strands->n_strands > 0 && strands->first[0] == 0 &&
+               strands->first[strands->n_strands] == strands->n_vertices);
     for (uint32_t i = 0; i < strands->n_strands; i++)
         fuzz_check(strands->first[i + 1] >= strands->first[i] + 2 &&
-                   groom_polyline_length((const float (*)[3])(strands->points + strands->first[i]),
+                   groom_polyline_length((const float(*)[3])(strands->points + strands->first[i]),
                                          strands->first[i + 1] - strands->first[i]) > 0);
     for (uint32_t i = 0; i < strands->n_vertices; i++)
         for (int k = 0; k < 3; k++)
@@ -73,8 +75,9 @@ static void fuzz_check_same(const struct fuzz_answer *a, const struct fuzz_answe
     fuzz_check(a->status == b->status && strcmp(a->diag.detail, b->diag.detail) == 0);
     fuzz_check(memcmp(&a->report, &b->report, sizeof a->report) == 0);
     if (a->strands)
-        fuzz_check(a->strands->n_vertices == b->strands->n_vertices &&
-                   memcmp(a->strands->points, b->strands->points, a->strands->n_vertices * sizeof(float[3])) == 0);
+        fuzz_check(
+            a->strands->n_vertices == b->strands->n_vertices &&
+            memcmp(a->strands->points, b->strands->points, a->strands->n_vertices * sizeof(float[3])) == 0);
 }
 
 static int fuzz_strands(groom_format format, const uint8_t *bytes, size_t n)
@@ -86,15 +89,19 @@ static int fuzz_strands(groom_format format, const uint8_t *bytes, size_t n)
     }
     fuzz_check_same(&answers[0], &answers[1]);
     /* Without a size some counts are believed a little longer; strands, once read, are the same. */
-    if (answers[0].status == GROOM_OK && answers[2].status == GROOM_OK && answers[0].report.format == answers[2].report.format)
+    if (answers[0].status == GROOM_OK && answers[2].status == GROOM_OK &&
+        answers[0].report.format == answers[2].report.format)
         fuzz_check(answers[0].strands->n_vertices == answers[2].strands->n_vertices);
     for (int i = 0; i < 3; i++)
         groom_strands_destroy(answers[i].strands);
     return 0;
 }
 
-#define FUZZ_STRANDS(format)                                                                                \
-    int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_bytes);                                       \
-    int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_bytes) { return fuzz_strands(format, bytes, n_bytes); }
+#define FUZZ_STRANDS(format)                                                                                 \
+    int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_bytes);                                        \
+    int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_bytes)                                         \
+    {                                                                                                        \
+        return fuzz_strands(format, bytes, n_bytes);                                                         \
+    }
 
 #endif

@@ -91,7 +91,8 @@ static void put_point_text(struct test_bytes *out, const char *format, int stran
 
 /* --- HAIR, MonoHair ----------------------------------------------------------------------- */
 
-static void put_hair_header(struct test_bytes *out, const char *magic, uint32_t arrays, uint32_t default_segments)
+static void put_hair_header(struct test_bytes *out, const char *magic, uint32_t arrays,
+                            uint32_t default_segments)
 {
     test_put(out, magic, 4);
     put_u32(out, S);
@@ -151,9 +152,11 @@ static void make_ct2hair(struct test_bytes *out) { put_records(out, 4, 0); }
 
 static void make_ply_strands(struct test_bytes *out)
 {
-    test_put_text(out, "ply\nformat binary_little_endian 1.0\ncomment a test\nelement vertex %d\n" XYZ
+    test_put_text(out,
+                  "ply\nformat binary_little_endian 1.0\ncomment a test\nelement vertex %d\n" XYZ
                   "property uchar red\nelement strand %d\nproperty ushort nsegs\nelement edge %d\n"
-                  "property int vertex1\nproperty int vertex2\nend_header\n", S * M, S, S * (M - 1));
+                  "property int vertex1\nproperty int vertex2\nend_header\n",
+                  S * M, S, S * (M - 1));
     for (int i = 0; i < S * M; i++) {
         put_point(out, i / M, i % M);
         test_put(out, "r", 1);
@@ -176,9 +179,11 @@ static void put_swapped(struct test_bytes *out, const void *bytes, size_t n)
 /* big-endian doubles, edges last to first */
 static void make_ply_edges(struct test_bytes *out)
 {
-    test_put_text(out, "ply\r\nformat binary_big_endian 1.0\r\nelement vertex %d\r\nproperty double x\r\n"
+    test_put_text(out,
+                  "ply\r\nformat binary_big_endian 1.0\r\nelement vertex %d\r\nproperty double x\r\n"
                   "property double y\r\nproperty double z\r\nelement edge %d\r\nproperty uint vertex1\r\n"
-                  "property uint vertex2\r\nend_header\r\n", S * M, S * (M - 1));
+                  "property uint vertex2\r\nend_header\r\n",
+                  S * M, S * (M - 1));
     for (int i = 0; i < S * M; i++) {
         float x[3];
         strand_file_point(i / M, i % M, x);
@@ -198,19 +203,24 @@ static void make_ply_edges(struct test_bytes *out)
 /* ascii, vertices last to first, strands as lists */
 static void make_ply_lists(struct test_bytes *out)
 {
-    test_put_text(out, "ply\nformat ascii 1.0\nelement vertex %d\n" XYZ
-                  "element strand %d\nproperty list uchar int vertex_indices\nend_header\n", S * M, S);
+    test_put_text(out,
+                  "ply\nformat ascii 1.0\nelement vertex %d\n" XYZ
+                  "element strand %d\nproperty list uchar int vertex_indices\nend_header\n",
+                  S * M, S);
     for (int i = S * M; i-- > 0;)
         put_point_text(out, "%.9g %.9g %.9g\n", i / M, i % M);
     for (int i = 0; i < S; i++)
-        test_put_text(out, "4 %d %d %d %d\n", S * M - 1 - M * i, S * M - 2 - M * i, S * M - 3 - M * i, S * M - 4 - M * i);
+        test_put_text(out, "4 %d %d %d %d\n", S * M - 1 - M * i, S * M - 2 - M * i, S * M - 3 - M * i,
+                      S * M - 4 - M * i);
 }
 
 /* GaussianHaircut: zero normals, no counts */
 static void make_ply_uniform(struct test_bytes *out)
 {
-    test_put_text(out, "ply\nformat binary_little_endian 1.0\nelement vertex %d\n" XYZ
-                  "property float nx\nproperty float ny\nproperty float nz\nend_header\n", S * 100);
+    test_put_text(out,
+                  "ply\nformat binary_little_endian 1.0\nelement vertex %d\n" XYZ
+                  "property float nx\nproperty float ny\nproperty float nz\nend_header\n",
+                  S * 100);
     for (int i = 0; i < S * 100; i++) {
         put_point(out, i / 100, i % 100);
         put_zeros(out, 12);
@@ -221,8 +231,10 @@ static void make_ply_uniform(struct test_bytes *out)
 
 static void make_tfx_2(struct test_bytes *out)
 {
-    test_put_text(out, "version 2.0\nscale 1.0\nrotation 0 0 0\ntranslation 0 0 0\nbothEndsImmovable 0\n"
-                  "maxNumVerticesInStrand %d\nnumStrands %d\nis sorted 1\n", M, S);
+    test_put_text(out,
+                  "version 2.0\nscale 1.0\nrotation 0 0 0\ntranslation 0 0 0\nbothEndsImmovable 0\n"
+                  "maxNumVerticesInStrand %d\nnumStrands %d\nis sorted 1\n",
+                  M, S);
     for (int i = 0; i < S; i++) {
         test_put_text(out, "strand %d numVerts %d texcoord %g 0.5\n", i, M, 0.25 * i);
         for (int k = 0; k < M; k++)
@@ -276,7 +288,8 @@ static void make_obj_lines(struct test_bytes *out)
     for (int i = 0; i < S; i++) {
         for (int k = 0; k < M; k++)
             put_point_text(out, "v %.9g %.9g %.9g\n", i, k);
-        test_put_text(out, i == 1 ? "l -4 -3 \\\n -2 -1\n" : "l %d %d/1 %d %d # one\n", M * i + 1, M * i + 2, M * i + 3, M * i + 4);
+        test_put_text(out, i == 1 ? "l -4 -3 \\\n -2 -1\n" : "l %d %d/1 %d %d # one\n", M * i + 1, M * i + 2,
+                      M * i + 3, M * i + 4);
     }
 }
 
@@ -313,13 +326,15 @@ static void make_json(struct test_bytes *out)
 
 static void make_json_array(struct test_bytes *out) { put_json_strands(out, "[ %.17e ,\t%.17g\n,%.12f ]"); }
 
-/* --- NumPy ----------------------------------------------------------------------------------------------- */
+/* --- NumPy -----------------------------------------------------------------------------------------------
+ */
 
 static void put_npy_header(struct test_bytes *out, const char *type, const char *shape)
 {
     char header[118]; /* ends at a multiple of 64 with the ten bytes before it */
     memset(header, ' ', sizeof header);
-    int n = snprintf(header, sizeof header, "{'descr': '%s', 'fortran_order': False, 'shape': (%s), }", type, shape);
+    int n = snprintf(header, sizeof header, "{'descr': '%s', 'fortran_order': False, 'shape': (%s), }", type,
+                     shape);
     header[n] = ' ';
     header[sizeof header - 1] = '\n';
     test_put(out, "\x93NUMPY\1\0", 8);
@@ -351,7 +366,9 @@ enum { STORED, DEFLATED, STREAMED = 2 /* sizes in a descriptor */, ZIP64 = 4 };
 static struct test_bytes deflated(const struct test_bytes *data)
 {
     struct test_bytes packed = {malloc(data->n + 1024), 0, data->n + 1024};
-    z_stream z = {.next_in = data->bytes, .avail_in = (uInt)data->n, .next_out = packed.bytes,
+    z_stream z = {.next_in = data->bytes,
+                  .avail_in = (uInt)data->n,
+                  .next_out = packed.bytes,
                   .avail_out = (uInt)packed.capacity};
     deflateInit2(&z, 6, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
     deflate(&z, Z_FINISH);
@@ -428,7 +445,8 @@ static void make_npz_deflated(struct test_bytes *out) { make_npz(out, DEFLATED);
 static void make_npz_streamed(struct test_bytes *out) { make_npz(out, DEFLATED | STREAMED); }
 static void make_npz_stored_streamed(struct test_bytes *out) { make_npz(out, STORED | STREAMED); }
 
-/* --- all ------------------------------------------------------------------------------------------------- */
+/* --- all -------------------------------------------------------------------------------------------------
+ */
 
 const struct strand_file strand_files[] = {
     {"segments", GROOM_FORMAT_HAIR, make_hair, 0, M},
@@ -457,7 +475,8 @@ const struct strand_file strand_files[] = {
 };
 const size_t n_strand_files = sizeof strand_files / sizeof strand_files[0];
 
-/* --- reading ------------------------------------------------------------------------------------------------ */
+/* --- reading
+ * ------------------------------------------------------------------------------------------------ */
 
 struct dribble {
     struct groom_memory_source memory;
@@ -468,7 +487,8 @@ struct dribble {
 static int64_t read_dribble(void *user, void *buffer, size_t capacity)
 {
     struct dribble *dribble = user;
-    return dribble->source.read(dribble->source.user, buffer, capacity < dribble->piece ? capacity : dribble->piece);
+    return dribble->source.read(dribble->source.user, buffer,
+                                capacity < dribble->piece ? capacity : dribble->piece);
 }
 
 groom_status test_read(const void *bytes, size_t n, size_t piece, const struct groom_read_options *options,

@@ -20,11 +20,11 @@ void test_put_text(struct test_bytes *bytes, const char *format, ...) __attribut
 groom_status test_sink_write(void *user, const void *bytes, size_t n);
 
 struct strand_file {
-    const char *name;         /* a file name: "hair_segments.hair" */
+    const char *name; /* a file name: "hair_segments.hair" */
     groom_format format;
     void (*make)(struct test_bytes *out);
     int has_root_uv;
-    int n_points;             /* of each of its strands: 4, or 100 */
+    int n_points; /* of each of its strands: 4, or 100 */
 };
 extern const struct strand_file strand_files[];
 extern const size_t n_strand_files;

@@ -80,7 +80,9 @@ END_TEST
 
 START_TEST(json_passes_over_other_members)
 {
-    expect_read("{\"a\":{\"b\":[1,-2.5e3,\"\\\"]}\",true,false,null,{}],\"c\":[]},\"strands\":[[[1,2,3],[4,5,6]]],\"z\":0}", 1, 2);
+    expect_read("{\"a\":{\"b\":[1,-2.5e3,\"\\\"]}\",true,false,null,{}],\"c\":[]},\"strands\":[[[1,2,3],[4,5,"
+                "6]]],\"z\":0}",
+                1, 2);
     expect_read("\xef\xbb\xbf [[[1,2,3],[4,5,6]]] ", 1, 2);
 }
 END_TEST
@@ -123,7 +125,8 @@ END_TEST
 
 START_TEST(obj_keeps_the_order_of_its_lines)
 {
-    struct outcome outcome = read_text("v 0 0 0\nv 0 0 1\nv 0 0 2\nv 5 0 0\nv 5 0 1\nv 5 0 2\nl 4 5 6\nl 3 2 1\n");
+    struct outcome outcome =
+        read_text("v 0 0 0\nv 0 0 1\nv 0 0 2\nv 5 0 0\nv 5 0 1\nv 5 0 2\nl 4 5 6\nl 3 2 1\n");
     ck_ok(outcome.status);
     ck_assert_uint_eq(outcome.strands->n_strands, 2);
     ck_assert_float_eq(outcome.strands->points[0][0], 5);
@@ -164,12 +167,18 @@ END_TEST
 START_TEST(ply_says_where_it_breaks)
 {
     static const struct refusal rows[] = {
-        {"ply\nformat ascii 1.0\nelement vertex 2\n" PLY_XYZ "element strand 1\nproperty int nsegs\nend_header\n"
-         "0 0 0\n0 0 1\n2\n", GROOM_EFORMAT, 149, "has 3 vertices, where 2 of 2 are left"},
-        {"ply\nformat ascii 1.0\nelement vertex 2\n" PLY_XYZ "element edge 1\nproperty int vertex1\nproperty int vertex2\n"
-         "end_header\n0 0 0\n0 0 1\n0 2\n", GROOM_EFORMAT, 172, "vertex2"},
-        {"ply\nformat ascii 1.0\nelement vertex 2\n" PLY_XYZ "end_header\n0 0 0\n0 0 1\n", GROOM_EFORMAT, 111, "multiple of 100"},
-        {"ply\nformat ascii 1.0\nelement vertex 99999999999\n" PLY_XYZ "end_header\n0 0 0\n", GROOM_ETRUNCATED, 110, "rows of element vertex"},
+        {"ply\nformat ascii 1.0\nelement vertex 2\n" PLY_XYZ
+         "element strand 1\nproperty int nsegs\nend_header\n"
+         "0 0 0\n0 0 1\n2\n",
+         GROOM_EFORMAT, 149, "has 3 vertices, where 2 of 2 are left"},
+        {"ply\nformat ascii 1.0\nelement vertex 2\n" PLY_XYZ
+         "element edge 1\nproperty int vertex1\nproperty int vertex2\n"
+         "end_header\n0 0 0\n0 0 1\n0 2\n",
+         GROOM_EFORMAT, 172, "vertex2"},
+        {"ply\nformat ascii 1.0\nelement vertex 2\n" PLY_XYZ "end_header\n0 0 0\n0 0 1\n", GROOM_EFORMAT, 111,
+         "multiple of 100"},
+        {"ply\nformat ascii 1.0\nelement vertex 99999999999\n" PLY_XYZ "end_header\n0 0 0\n",
+         GROOM_ETRUNCATED, 110, "rows of element vertex"},
         {"ply\nformat klingon 1.0\n", GROOM_EFORMAT, 18, "ascii, binary_little_endian"},
         {"ply\nproperty float x\n", GROOM_EFORMAT, 12, "an element before"},
         {"ply\nformat ascii 1.0\nelement vertex 5\nend_header\n", GROOM_EFORMAT, 49, "without a property"},
@@ -180,9 +189,12 @@ END_TEST
 
 START_TEST(ply_takes_other_names_and_elements)
 {
-    expect_read("ply\nformat ascii 1.0\nobj_info x\nelement camera 1\nproperty list uchar float k\nelement vertex 5\n"
-                "property uchar red\n" PLY_XYZ "element strand 2\nproperty uchar id\nproperty uint n_points\nend_header\n"
-                "2 0.5 0.25\n9 0 0 0\n9 0 0 1\n9 0 0 2\n9 1 0 0\n9 1 0 1\n7 3\n8 2\n", 2, 5);
+    expect_read(
+        "ply\nformat ascii 1.0\nobj_info x\nelement camera 1\nproperty list uchar float k\nelement vertex 5\n"
+        "property uchar red\n" PLY_XYZ
+        "element strand 2\nproperty uchar id\nproperty uint n_points\nend_header\n"
+        "2 0.5 0.25\n9 0 0 0\n9 0 0 1\n9 0 0 2\n9 1 0 0\n9 1 0 1\n7 3\n8 2\n",
+        2, 5);
 }
 END_TEST
 
@@ -191,7 +203,8 @@ END_TEST
 START_TEST(tfx_text_says_where_it_breaks)
 {
     static const struct refusal rows[] = {
-        {"version 2.0\nnumStrands 2\nstrand 0 numVerts 2 texcoord 0 0\n0 0 0\n0 0 1\n", GROOM_ETRUNCATED, 70, "the next strand"},
+        {"version 2.0\nnumStrands 2\nstrand 0 numVerts 2 texcoord 0 0\n0 0 0\n0 0 1\n", GROOM_ETRUNCATED, 70,
+         "the next strand"},
         {"version 2.0\nstrand 0 numVerts -2\n", GROOM_EFORMAT, 30, "count of vertices"},
         {"version 2.0\nstrand 0 vertices 2\n", GROOM_EFORMAT, 21, "numVerts"},
         {"version 2.0\nstrand 0 numVerts 2\n0 0 0\n0 zero 1\n", GROOM_EFORMAT, 40, "a coordinate"}};
@@ -257,7 +270,9 @@ static void put_npy(struct test_bytes *out, const char *dictionary)
 
 START_TEST(npy_refuses_what_are_no_positions)
 {
-    static const struct { const char *dictionary, *words; } rows[] = {
+    static const struct {
+        const char *dictionary, *words;
+    } rows[] = {
         {"{'descr': '<i4', 'fortran_order': False, 'shape': (1, 2, 3), }", "float32"},
         {"{'descr': '<f4', 'fortran_order': True, 'shape': (1, 2, 3), }", "column-major"},
         {"{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }", "(strands, vertices, 3)"},
@@ -280,7 +295,8 @@ END_TEST
 
 START_TEST(npy_takes_half_floats)
 {
-    static const unsigned short halves[] = {0x3c00, 0xc000, 0x0001, 0x3555, 0x0000, 0x7bff}; /* 1 -2 2^-24 0.333 0 65504 */
+    static const unsigned short halves[] = {0x3c00, 0xc000, 0x0001,
+                                            0x3555, 0x0000, 0x7bff}; /* 1 -2 2^-24 0.333 0 65504 */
     struct test_bytes bytes = {0};
     put_npy(&bytes, "{'descr': '<f2', 'fortran_order': False, 'shape': (1, 2, 3), }");
     test_put(&bytes, halves, sizeof halves);
@@ -330,7 +346,8 @@ static struct test_bytes bomb(size_t n_strands)
     local[26] = 13;
     memcpy(local + 30, "positions.npy", 13);
     test_put(&packed, local, sizeof local);
-    snprintf(dictionary, sizeof dictionary, "{'descr': '<f4', 'fortran_order': False, 'shape': (%zu, 8, 3), }", n_strands);
+    snprintf(dictionary, sizeof dictionary,
+             "{'descr': '<f4', 'fortran_order': False, 'shape': (%zu, 8, 3), }", n_strands);
     put_npy(&header, dictionary);
     strand[7][2] = 1;
     deflateInit2(&z, 6, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
@@ -363,6 +380,7 @@ END_TEST
 TEST_SUITE("formats_details", json_says_where_it_breaks, json_passes_over_other_members, json_is_only_so_deep,
            a_number_without_end_is_refused, obj_says_where_it_breaks, obj_keeps_the_order_of_its_lines,
            obj_repeats_vertices_that_lines_share, obj_opens_closed_lines, ply_says_where_it_breaks,
-           ply_takes_other_names_and_elements, tfx_text_says_where_it_breaks, hair_checks_its_counts_against_each_other,
-           data_names_the_record_that_is_wrong, bytes_after_the_last_strand_are_warned_of, npy_refuses_what_are_no_positions,
+           ply_takes_other_names_and_elements, tfx_text_says_where_it_breaks,
+           hair_checks_its_counts_against_each_other, data_names_the_record_that_is_wrong,
+           bytes_after_the_last_strand_are_warned_of, npy_refuses_what_are_no_positions,
            npy_takes_half_floats, npz_compares_checksums, npz_bombs_are_defused)

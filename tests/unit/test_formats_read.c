@@ -13,13 +13,14 @@
 #include "tests/support/test.h"
 
 static groom_status read_bytes(const struct test_bytes *bytes, const struct groom_read_options *options,
-                               struct groom_strands **strands, struct groom_read_report *report, struct groom_diag *diag)
+                               struct groom_strands **strands, struct groom_read_report *report,
+                               struct groom_diag *diag)
 {
     return test_read(bytes->bytes, bytes->n, 0, options, NULL, strands, report, diag);
 }
 
-static groom_status read_text(const char *text, struct groom_strands **strands, struct groom_read_report *report,
-                              struct groom_diag *diag)
+static groom_status read_text(const char *text, struct groom_strands **strands,
+                              struct groom_read_report *report, struct groom_diag *diag)
 {
     return test_read(text, strlen(text), 0, NULL, NULL, strands, report, diag);
 }
@@ -33,8 +34,8 @@ static void expect_sample(const struct strand_file *file, const struct groom_str
             float expected[3], *point = strands->points[strands->first[i] + (uint32_t)k];
             strand_file_point((int)i, k, expected);
             for (int j = 0; j < 3; j++)
-                ck_assert_msg(fabsf(point[j] - expected[j]) <= 1e-7f, "%s: strand %u vertex %d: %g, not %g", file->name, i,
-                              k, (double)point[j], (double)expected[j]);
+                ck_assert_msg(fabsf(point[j] - expected[j]) <= 1e-7f, "%s: strand %u vertex %d: %g, not %g",
+                              file->name, i, k, (double)point[j], (double)expected[j]);
         }
         if (file->has_root_uv) {
             ck_assert_msg(strands->root_uv != NULL, "%s has no root_uv", file->name);
@@ -57,7 +58,8 @@ START_TEST(every_encoding_is_recognised_and_reads_as_the_same_strands)
         file->make(&bytes);
         groom_status status = read_bytes(&bytes, NULL, &strands, &report, &diag);
         ck_assert_msg(status == GROOM_OK, "%s: %s", file->name, diag.detail);
-        ck_assert_msg(report.format == file->format, "%s taken for %s", file->name, groom_format_name(report.format));
+        ck_assert_msg(report.format == file->format, "%s taken for %s", file->name,
+                      groom_format_name(report.format));
         expect_sample(file, strands);
         groom_strands_destroy(strands);
         test_bytes_finish(&bytes);
@@ -74,7 +76,8 @@ START_TEST(a_pipe_gives_what_a_file_gives)
             struct groom_strands *strands = NULL;
             struct groom_diag diag = {0};
             strand_files[i].make(&bytes);
-            groom_status status = test_read(bytes.bytes, bytes.n, pieces[j], NULL, NULL, &strands, NULL, &diag);
+            groom_status status =
+                test_read(bytes.bytes, bytes.n, pieces[j], NULL, NULL, &strands, NULL, &diag);
             ck_assert_msg(status == GROOM_OK, "%s: %s", strand_files[i].name, diag.detail);
             expect_sample(&strand_files[i], strands);
             groom_strands_destroy(strands);
@@ -112,14 +115,15 @@ END_TEST
 
 /* --- damage -------------------------------------------------------------------------------- */
 
-static void expect_refusal(const struct strand_file *file, size_t n, groom_status status, const struct groom_diag *diag,
-                           const struct groom_strands *strands)
+static void expect_refusal(const struct strand_file *file, size_t n, groom_status status,
+                           const struct groom_diag *diag, const struct groom_strands *strands)
 {
     ck_assert_msg(status != GROOM_OK, "%s cut at %zu was read", file->name, n);
     ck_assert_ptr_null(strands);
-    ck_assert_msg(diag->byte_offset >= 0 && (size_t)diag->byte_offset <= n, "%s cut at %zu: offset %lld: %s", file->name, n,
-                  (long long)diag->byte_offset, diag->detail);
-    ck_assert_msg(strlen(diag->detail) > 10 && diag->status == status, "%s cut at %zu says nothing", file->name, n);
+    ck_assert_msg(diag->byte_offset >= 0 && (size_t)diag->byte_offset <= n, "%s cut at %zu: offset %lld: %s",
+                  file->name, n, (long long)diag->byte_offset, diag->detail);
+    ck_assert_msg(strlen(diag->detail) > 10 && diag->status == status, "%s cut at %zu says nothing",
+                  file->name, n);
 }
 
 /* The formats that say how much is to come; an OBJ may end after any line. */
@@ -127,7 +131,8 @@ static int notices_a_cut(const struct strand_file *file, const struct test_bytes
 {
     if (file->format == GROOM_FORMAT_OBJ)
         return 0;
-    if (file->format == GROOM_FORMAT_TFX || file->format == GROOM_FORMAT_JSON || strcmp(file->name, "lists_ascii") == 0)
+    if (file->format == GROOM_FORMAT_TFX || file->format == GROOM_FORMAT_JSON ||
+        strcmp(file->name, "lists_ascii") == 0)
         return n + 14 < bytes->n; /* white space, or the last digits of a number */
     return 1;
 }
@@ -184,7 +189,8 @@ START_TEST(a_failing_allocation_is_answered_and_leaks_nothing)
             test_failing_allocator_init(&state, fail_at, &allocator);
             struct groom_context context = {.allocator = &allocator};
             struct groom_strands *strands = NULL;
-            groom_status status = test_read(bytes.bytes, bytes.n, fail_at % 2 * 50, NULL, &context, &strands, NULL, NULL);
+            groom_status status =
+                test_read(bytes.bytes, bytes.n, fail_at % 2 * 50, NULL, &context, &strands, NULL, NULL);
             groom_strands_destroy(strands);
             ck_assert_uint_eq(state.outstanding_bytes, 0);
             if (status == GROOM_OK)
@@ -234,7 +240,11 @@ END_TEST
 
 START_TEST(what_is_no_strand_file_is_said_to_be_so)
 {
-    static const struct { const char *text; groom_status status; const char *word; } rows[] = {
+    static const struct {
+        const char *text;
+        groom_status status;
+        const char *word;
+    } rows[] = {
         {"", GROOM_ETRUNCATED, "empty"},
         {"Ogawa\xff", GROOM_EUNKNOWN, "Alembic"},
         {"#usda 1.0\n", GROOM_EUNKNOWN, "USD"},
@@ -243,7 +253,8 @@ START_TEST(what_is_no_strand_file_is_said_to_be_so)
         {"\x89PNG\r\n\x1a\n and so on, for a while longer", GROOM_EUNKNOWN, "no strand format"},
         {"v 1 2 3\nf 1 1 1\n", GROOM_EFORMAT, "mesh"},
         {"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
-         "element face 1\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n3 0 0 0\n", GROOM_EFORMAT, "mesh"}};
+         "element face 1\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n3 0 0 0\n",
+         GROOM_EFORMAT, "mesh"}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         struct groom_strands *strands = NULL;
         struct groom_diag diag = {0};
@@ -259,8 +270,10 @@ START_TEST(strands_of_no_use_are_dropped_and_counted)
 {
     struct groom_strands *strands = NULL;
     struct groom_read_report report;
-    ck_ok(read_text("[[], [[1,1,1]], [[0,0,0],[NaN,1,1]], [[7,7,7],[7,7,8]], [[2,2,2],[2,2,2],[2,2,2]], [[0,0,null],[1,1,1]],"
-                    "[[0,0,0],[1e39,0,0]], [[5,5,5],[6,5,5],[7,5,5]]]", &strands, &report, NULL));
+    ck_ok(read_text("[[], [[1,1,1]], [[0,0,0],[NaN,1,1]], [[7,7,7],[7,7,8]], [[2,2,2],[2,2,2],[2,2,2]], "
+                    "[[0,0,null],[1,1,1]],"
+                    "[[0,0,0],[1e39,0,0]], [[5,5,5],[6,5,5],[7,5,5]]]",
+                    &strands, &report, NULL));
     ck_assert_uint_eq(report.n_strands_in_file, 8);
     ck_assert_uint_eq(report.n_dropped_short, 2);
     ck_assert_uint_eq(report.n_dropped_not_finite, 3);
@@ -290,7 +303,8 @@ START_TEST(root_uv_follows_the_strands_that_are_kept)
 {
     struct groom_strands *strands = NULL;
     ck_ok(read_text("version 2.0\nstrand 0 numVerts 2 texcoord 0.1 0.1\n0 0 0\n0 0 0\n"
-                    "strand 1 numVerts 2 texcoord 0.2 0.3\n0 0 0\n0 0 1\n", &strands, NULL, NULL));
+                    "strand 1 numVerts 2 texcoord 0.2 0.3\n0 0 0\n0 0 1\n",
+                    &strands, NULL, NULL));
     ck_assert_uint_eq(strands->n_strands, 1);
     ck_assert_float_eq(strands->root_uv[0][0], 0.2f);
     ck_assert_float_eq(strands->root_uv[0][1], 0.3f);
@@ -325,14 +339,16 @@ START_TEST(more_vertices_than_the_limit_are_refused)
             ck_ok(test_read(bytes.bytes, bytes.n, piece, &options, NULL, &strands, NULL, NULL));
             groom_strands_destroy(strands);
             options.max_vertices = n - 1;
-            groom_status status = test_read(bytes.bytes, bytes.n, piece, &options, NULL, &strands, NULL, NULL);
+            groom_status status =
+                test_read(bytes.bytes, bytes.n, piece, &options, NULL, &strands, NULL, NULL);
             ck_assert_msg(status == GROOM_ETOOBIG, "%s: %s", strand_files[i].name, groom_status_name(status));
             test_bytes_finish(&bytes);
         }
 }
 END_TEST
 
-/* --- memory ----------------------------------------------------------------------------------------------- */
+/* --- memory -----------------------------------------------------------------------------------------------
+ */
 
 struct peak {
     size_t now, highest;
@@ -366,7 +382,7 @@ static struct test_bytes big_file(groom_format format)
     ck_ok(groom_writer_create(&options, n_strands, NULL, m, sink, NULL, &writer, NULL));
     for (uint32_t i = 0; i < n_strands * m; i++) {
         float point[1][3] = {{(float)i * 1e-5f, sinf((float)i), (float)(i % m) * 0.01f}};
-        ck_ok(groom_writer_points(writer, (const float (*)[3])point, 1, NULL));
+        ck_ok(groom_writer_points(writer, (const float(*)[3])point, 1, NULL));
     }
     ck_ok(groom_writer_finish(writer, NULL));
     groom_writer_destroy(writer);
@@ -382,7 +398,8 @@ static void expect_bounded(const struct test_bytes *bytes, size_t piece, const c
     struct groom_strands *strands = NULL;
     ck_ok(test_read(bytes->bytes, bytes->n, piece, NULL, &context, &strands, NULL, NULL));
     size_t own = 12 * (size_t)strands->n_vertices + 4 * ((size_t)strands->n_strands + 1), fixed = 160 << 10;
-    ck_assert_msg(peak.highest <= 2 * own + fixed, "%s: %zu bytes at most, where the strands are %zu", name, peak.highest, own);
+    ck_assert_msg(peak.highest <= 2 * own + fixed, "%s: %zu bytes at most, where the strands are %zu", name,
+                  peak.highest, own);
     groom_strands_destroy(strands);
     ck_assert_uint_eq(peak.now, 0);
 }
@@ -417,7 +434,11 @@ END_TEST
 
 START_TEST(counts_that_lie_take_no_memory)
 {
-    static const struct { const char *name; size_t n; unsigned char bytes[64]; } rows[] = {
+    static const struct {
+        const char *name;
+        size_t n;
+        unsigned char bytes[64];
+    } rows[] = {
         {"data", 12, {255, 255, 255, 127, 255, 255, 255, 127, 0, 0, 0, 0}},
         {"hair", 20, {'H', 'A', 'I', 'R', 255, 255, 255, 255, 255, 255, 255, 255, 3, 0, 0, 0, 0, 0, 0, 0}},
         {"tfx", 16, {0, 0, 128, 64, 255, 255, 255, 255, 255, 255, 255, 255, 160, 0, 0, 0}}};
@@ -436,7 +457,8 @@ START_TEST(counts_that_lie_take_no_memory)
 }
 END_TEST
 
-/* --- real files ------------------------------------------------------------------------------------------- */
+/* --- real files -------------------------------------------------------------------------------------------
+ */
 
 static struct groom_strands *read_shared(const char *relative, groom_format expected)
 {
@@ -457,10 +479,14 @@ static struct groom_strands *read_shared(const char *relative, groom_format expe
 
 START_TEST(encodings_of_a_real_file_are_the_same_strands)
 {
-    static const struct { const char *name; groom_format format; } files[] = {
-        {"bangs100/Bangs_100.data", GROOM_FORMAT_DATA}, {"bangs100/Bangs_100.hair", GROOM_FORMAT_HAIR},
-        {"bangs100/Bangs_100.bin", GROOM_FORMAT_CT2HAIR}, {"bangs100/Bangs_100_binary.ply", GROOM_FORMAT_PLY},
-        {"bangs100/Bangs_100_ascii.ply", GROOM_FORMAT_PLY}};
+    static const struct {
+        const char *name;
+        groom_format format;
+    } files[] = {{"bangs100/Bangs_100.data", GROOM_FORMAT_DATA},
+                 {"bangs100/Bangs_100.hair", GROOM_FORMAT_HAIR},
+                 {"bangs100/Bangs_100.bin", GROOM_FORMAT_CT2HAIR},
+                 {"bangs100/Bangs_100_binary.ply", GROOM_FORMAT_PLY},
+                 {"bangs100/Bangs_100_ascii.ply", GROOM_FORMAT_PLY}};
     struct groom_strands *reference = read_shared(files[0].name, files[0].format);
     if (!reference)
         return;
@@ -481,14 +507,18 @@ END_TEST
 
 START_TEST(real_files_read_whole)
 {
-    static const struct { const char *name; groom_format format; uint32_t n_strands, n_vertices; int has_root_uv; } files[] = {
-        {"harolongo/hair.data", GROOM_FORMAT_DATA, 7905, 166005, 0},
-        {"combover/hair.data", GROOM_FORMAT_DATA, 30534, 244272, 0},
-        {"guides/back.data", GROOM_FORMAT_DATA, 1044, 33408, 0},
-        {"guides/scene_hair.data", GROOM_FORMAT_DATA, 3780, 38659, 0},
-        {"guides/slicked_back.data", GROOM_FORMAT_DATA, 1071, 12437, 0},
-        {"mohawk/hair.tfx", GROOM_FORMAT_TFX, 2228, 71296, 1},
-        {"sintel/hair.tfx", GROOM_FORMAT_TFX, 11400, 182400, 0}};
+    static const struct {
+        const char *name;
+        groom_format format;
+        uint32_t n_strands, n_vertices;
+        int has_root_uv;
+    } files[] = {{"harolongo/hair.data", GROOM_FORMAT_DATA, 7905, 166005, 0},
+                 {"combover/hair.data", GROOM_FORMAT_DATA, 30534, 244272, 0},
+                 {"guides/back.data", GROOM_FORMAT_DATA, 1044, 33408, 0},
+                 {"guides/scene_hair.data", GROOM_FORMAT_DATA, 3780, 38659, 0},
+                 {"guides/slicked_back.data", GROOM_FORMAT_DATA, 1071, 12437, 0},
+                 {"mohawk/hair.tfx", GROOM_FORMAT_TFX, 2228, 71296, 1},
+                 {"sintel/hair.tfx", GROOM_FORMAT_TFX, 11400, 182400, 0}};
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
         struct groom_strands *strands = read_shared(files[i].name, files[i].format);
         if (!strands)
@@ -514,7 +544,8 @@ START_TEST(the_fuzz_corpus_holds_every_encoding)
         snprintf(path, sizeof path, "tests/fuzz/corpus/%s/%s", format, strand_files[i].name);
         if (getenv("GROOM_UPDATE")) {
             FILE *file = fopen(path, "wb");
-            ck_assert_msg(file && fwrite(bytes.bytes, 1, bytes.n, file) == bytes.n && fclose(file) == 0, "%s", path);
+            ck_assert_msg(file && fwrite(bytes.bytes, 1, bytes.n, file) == bytes.n && fclose(file) == 0, "%s",
+                          path);
         }
         struct stat status;
         ck_assert_msg(stat(path, &status) == 0 && (size_t)status.st_size == bytes.n,
@@ -524,11 +555,14 @@ START_TEST(the_fuzz_corpus_holds_every_encoding)
 }
 END_TEST
 
-TEST_SUITE("formats_read", every_encoding_is_recognised_and_reads_as_the_same_strands, a_pipe_gives_what_a_file_gives,
-           a_named_format_is_held_to, a_cut_at_any_byte_is_refused_with_its_offset, any_flipped_byte_is_read_or_refused,
-           a_failing_allocation_is_answered_and_leaks_nothing, a_failing_source_is_an_io_error, a_cancelled_read_stops,
-           what_is_no_strand_file_is_said_to_be_so, strands_of_no_use_are_dropped_and_counted, no_usable_strand_is_empty,
+TEST_SUITE("formats_read", every_encoding_is_recognised_and_reads_as_the_same_strands,
+           a_pipe_gives_what_a_file_gives, a_named_format_is_held_to,
+           a_cut_at_any_byte_is_refused_with_its_offset, any_flipped_byte_is_read_or_refused,
+           a_failing_allocation_is_answered_and_leaks_nothing, a_failing_source_is_an_io_error,
+           a_cancelled_read_stops, what_is_no_strand_file_is_said_to_be_so,
+           strands_of_no_use_are_dropped_and_counted, no_usable_strand_is_empty,
            root_uv_follows_the_strands_that_are_kept, units_and_up_axis_are_converted,
            more_vertices_than_the_limit_are_refused, memory_stays_within_twice_the_strands,
            memory_stays_within_twice_the_strands_for_shuffled_lines, counts_that_lie_take_no_memory,
-           encodings_of_a_real_file_are_the_same_strands, real_files_read_whole, the_fuzz_corpus_holds_every_encoding)
+           encodings_of_a_real_file_are_the_same_strands, real_files_read_whole,
+           the_fuzz_corpus_holds_every_encoding)

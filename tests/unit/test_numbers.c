@@ -29,14 +29,41 @@ static void expect_printed(float value)
 
 START_TEST(print_says_what_printf_says)
 {
-    static const float special[] = {0, -0.0f, 1, -1, 0.1f, 0.5f, 10, 123456789, 999999999, 1e9f, 1e8f, 99999999, 1e-4f,
-                                    9.9999997e-5f, 1e-5f, 1e-27f, 9.99e-28f, 1.17549435e-38f, 1e-45f, 3.4028235e38f,
-                                    8388608.5f, 16777216, 0.3f, 1e10f, 5e-1f, 33554432.0f, 1073741824.0f, 4294967296.0f};
+    static const float special[] = {0,
+                                    -0.0f,
+                                    1,
+                                    -1,
+                                    0.1f,
+                                    0.5f,
+                                    10,
+                                    123456789,
+                                    999999999,
+                                    1e9f,
+                                    1e8f,
+                                    99999999,
+                                    1e-4f,
+                                    9.9999997e-5f,
+                                    1e-5f,
+                                    1e-27f,
+                                    9.99e-28f,
+                                    1.17549435e-38f,
+                                    1e-45f,
+                                    3.4028235e38f,
+                                    8388608.5f,
+                                    16777216,
+                                    0.3f,
+                                    1e10f,
+                                    5e-1f,
+                                    33554432.0f,
+                                    1073741824.0f,
+                                    4294967296.0f};
     for (size_t i = 0; i < sizeof special / sizeof special[0]; i++)
         expect_printed(special[i]);
     for (int e = -45; e <= 38; e++) /* both neighbours of every power of ten */
         for (int k = -3; k <= 3; k++) {
-            float value = strtof((char[8]){'1', 'e', e < 0 ? '-' : '+', (char)('0' + abs(e) / 10), (char)('0' + abs(e) % 10)}, NULL);
+            float value = strtof(
+                (char[8]){'1', 'e', e < 0 ? '-' : '+', (char)('0' + abs(e) / 10), (char)('0' + abs(e) % 10)},
+                NULL);
             uint32_t bits;
             memcpy(&bits, &value, sizeof bits);
             expect_printed(float_of(bits + (uint32_t)k));
@@ -74,7 +101,9 @@ START_TEST(scan_gives_back_every_float_that_print_wrote)
             const unsigned char *end = number_scan((const unsigned char *)text, &value);
             double padded;
             float back = (float)value;
-            if (number_scan_padded((const unsigned char *)text, &padded) != end || padded != value || end != (const unsigned char *)text + strlen(text) || memcmp(&back, &expected, sizeof back) != 0)
+            if (number_scan_padded((const unsigned char *)text, &padded) != end || padded != value ||
+                end != (const unsigned char *)text + strlen(text) ||
+                memcmp(&back, &expected, sizeof back) != 0)
                 ck_abort_msg("%s is read as %a, not %a", text, (double)back, (double)expected);
         }
     }
@@ -96,7 +125,8 @@ START_TEST(scan_is_near_strtod_for_doubles)
         snprintf(text, sizeof text, words[2] & 1 ? "%.17g" : "%.25e", expected);
         double padded;
         if (!number_scan((const unsigned char *)text, &value) ||
-            number_scan_padded((const unsigned char *)text, &padded) == NULL || padded != value || fabs(value - expected) > nextafter(fabs(expected), INFINITY) - fabs(expected))
+            number_scan_padded((const unsigned char *)text, &padded) == NULL || padded != value ||
+            fabs(value - expected) > nextafter(fabs(expected), INFINITY) - fabs(expected))
             ck_abort_msg("%s is read as %.17g", text, value);
     }
 }
@@ -104,11 +134,27 @@ END_TEST
 
 START_TEST(scan_takes_every_spelling)
 {
-    static const struct { const char *text; double value; size_t length; } rows[] = {
-        {"0", 0, 1}, {"-0.5", -0.5, 4}, {"+1.", 1, 3}, {".25", 0.25, 3}, {"1e3", 1000, 3}, {"1E+2,", 100, 4}, {"1e-2]", 0.01, 4},
-        {"12e", 12, 2}, {"12e+x", 12, 2}, {"1.5.5", 1.5, 3}, {"00012", 12, 5}, {"1e400", INFINITY, 5}, {"1e-400", 0, 6},
-        {"0e99999999999", 0, 13}, {"123456789012345678901234567890", 123456789012345678901234567890.0, 30},
-        {"0.000000000000000000000000000000000000000000001", 1e-45, 47}, {"1e-99999999999", 0, 14}};
+    static const struct {
+        const char *text;
+        double value;
+        size_t length;
+    } rows[] = {{"0", 0, 1},
+                {"-0.5", -0.5, 4},
+                {"+1.", 1, 3},
+                {".25", 0.25, 3},
+                {"1e3", 1000, 3},
+                {"1E+2,", 100, 4},
+                {"1e-2]", 0.01, 4},
+                {"12e", 12, 2},
+                {"12e+x", 12, 2},
+                {"1.5.5", 1.5, 3},
+                {"00012", 12, 5},
+                {"1e400", INFINITY, 5},
+                {"1e-400", 0, 6},
+                {"0e99999999999", 0, 13},
+                {"123456789012345678901234567890", 123456789012345678901234567890.0, 30},
+                {"0.000000000000000000000000000000000000000000001", 1e-45, 47},
+                {"1e-99999999999", 0, 14}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         double value = NAN;
         const unsigned char *text = (const unsigned char *)rows[i].text, *end = number_scan(text, &value);
@@ -154,5 +200,6 @@ START_TEST(integers_are_bounded)
 END_TEST
 
 TEST_SUITE("numbers", print_says_what_printf_says, print_says_what_printf_says_for_random_bits,
-           scan_gives_back_every_float_that_print_wrote, scan_is_near_strtod_for_doubles, scan_takes_every_spelling,
-           scan_refuses_what_is_no_number, special_values_are_taken_apart, integers_are_bounded)
+           scan_gives_back_every_float_that_print_wrote, scan_is_near_strtod_for_doubles,
+           scan_takes_every_spelling, scan_refuses_what_is_no_number, special_values_are_taken_apart,
+           integers_are_bounded)

@@ -72,8 +72,9 @@ END_TEST
 
 START_TEST(resample_is_uniform_in_arc_length)
 {
-    static const float expected[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {1, 2, 0},
-                                         {0, 0, 5}, {0, 0, 5 + 4 / 3.0f}, {0, 0, 5 + 8 / 3.0f}, {0, 0, 9}};
+    static const float expected[8][3] = {
+        {0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {1, 2, 0}, {0, 0, 5}, {0, 0, 5 + 4 / 3.0f}, {0, 0, 5 + 8 / 3.0f},
+        {0, 0, 9}};
     float out[8][3];
     struct groom_strands *strands = two_strands();
     ck_ok(groom_strands_resample(strands, 4, out, NULL, NULL));

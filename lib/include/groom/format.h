@@ -72,7 +72,16 @@ struct groom_read_report {
     char warnings[GROOM_READ_MAX_WARNINGS][160]; /* sentences, the counts above among them */
 };
 
-/* Read strands, convert to metres and y up.
+/* Read strands, convert to metres and y up (in double, rounded once to float).
+ *
+ * A coordinate beyond 1000 km counts as not finite: no head is there, and its square would overflow later.
+ * JSON's null, NaN and Infinity are values that are not finite; "strands" is read, other members are
+ * passed over, and the array of strands alone is taken as well. PLY that says nothing of strands is taken
+ * for 100 points each (NeuralHaircut, GaussianHaircut). Lines of two indices (OBJ, PLY edges) are rejoined
+ * in any order. Scalp coordinates come with .tfx and .npz (root_uv). Memory beyond twice the strands'
+ * own arrays is some 160 KiB of windows.
+ *
+ * source   read from where it stands, front to back; it may be a pipe
  * report   may be NULL
  * returns  GROOM_OK; GROOM_EUNKNOWN, GROOM_EFORMAT, GROOM_ETRUNCATED, GROOM_ETOOBIG, GROOM_EEMPTY
  *          (no strand is usable), GROOM_EIO, GROOM_ENOMEM, each with a diag that names the byte
@@ -94,12 +103,16 @@ struct groom_write_options {
 
 struct groom_writer;
 
-/* Start a file whose layout is known: the vertex count of each strand. Points follow in order,
+/* What is written: HAIR with its list of segments; PLY, binary little-endian, with elements vertex (x y z),
+ * strand (nsegs) and edge (vertex1 vertex2), which is what reads back and what viewers without strands show;
+ * OBJ with one `l` after the vertices of each strand; numbers in text as %.9g, which every float survives.
+ *
+ * Start a file whose layout is known: the vertex count of each strand. Points follow in order,
  * in any number of pieces, so that a groom is written while it is evaluated; memory is bounded
  * whatever the size.
  * vertex_counts  [n_strands], borrowed until finish; NULL where all have uniform_count
  * returns        GROOM_OK, GROOM_EINVAL (format not writable; a strand too long for the format,
- *                65 536 vertices in HAIR), GROOM_ENOMEM, what the sink answers */
+ *                65 536 vertices in HAIR and PLY; a strand of fewer than 2), GROOM_ENOMEM, what the sink answers */
 GROOM_MUST_CHECK groom_status groom_writer_create(const struct groom_write_options *options,
                                                   uint32_t n_strands, const uint32_t *vertex_counts,
                                                   uint32_t uniform_count, struct groom_sink sink,
