@@ -135,6 +135,62 @@ GROOM_MUST_CHECK groom_status groom_strands_convert(const struct groom_strands *
                                                     struct groom_diag *diag);
 void groom_conversion_destroy(struct groom_conversion *conversion); /* takes NULL */
 
+/* --- sculpt (Section 5) --------------------------------------------------------- */
+
+/* A control point and where it should go. */
+struct groom_anchor {
+    uint32_t strand;
+    double at;          /* 0..1 of the strand's arc length */
+    double position[3]; /* metres */
+};
+
+struct groom_sculpt_options {
+    double stiffness;        /* N c of Eq. 15 (metre^4, N the strand's elements): how little curvature may change */
+    uint32_t max_iterations; /* of the first attempt */
+    uint32_t n_roads;        /* for strands that are not done then: 0 leave them; 1 go on, up to ten times as
+                                many; 2, 3 come again from the start by smaller turns, and keep the best */
+    uint32_t max_tail;       /* of a plain L-BFGS, for what still goes downhill after all that */
+    double tolerance;        /* stop where a step promises less than this share of the energy */
+    double most_turning;     /* radians that one step may turn a strand, over its length */
+};
+
+/* 30 iterations, 3 roads (a drag in progress can do with 0), a tail of 200, 1e-8, 1.5 rad; stiffness of the paper's c = 10 at 45 elements. */
+struct groom_sculpt_options groom_sculpt_options_default(void);
+
+/* The paper's c is in cm^4 and grows with the count of elements; the stiffness here is c N, so that a
+ * slider means the same at any count. groom_sculpt_stiffness(10, 45) is the paper's c = 10 with 45. */
+double groom_sculpt_stiffness(double c_cm4, uint32_t n_elements);
+
+typedef enum groom_sculpt_end {
+    GROOM_SCULPT_UNTOUCHED = 0, /* no anchor on this strand */
+    GROOM_SCULPT_CONVERGED,
+    GROOM_SCULPT_STOPPED        /* the iterations ran out while it still went downhill */
+} groom_sculpt_end;
+
+struct groom_sculpt_outcome {
+    groom_sculpt_end end;
+    uint32_t iterations;                 /* tail included */
+    double energy_before, energy_after;  /* Eq. 15, metre^2; after is never more than before */
+    double anchor_error_max_m, anchor_error_mean_m; /* what the anchors still miss by */
+};
+
+/* Change curvatures so that control points go to their anchors while the rest keeps its shape (Eq. 15);
+ * lengths, roots and root frames stay exactly. Strands without anchors are left alone.
+ * helices   q is where the solver starts, and the result; untouched on error
+ * rest_q    [n_elements][3] the shape to keep (q_0); NULL: helices->q as it is at the call. With it a
+ *           drag starts each time from the last result.
+ * outcomes  [n_strands], or NULL
+ * returns   GROOM_OK, GROOM_EINVAL (an anchor off its strand or not finite: diag points to /anchors/i/...;
+ *           options), GROOM_ENOMEM, GROOM_ECANCELLED
+ * threads   deterministic for any pool and any instruction set */
+GROOM_MUST_CHECK groom_status groom_superhelices_sculpt(struct groom_superhelices *helices,
+                                                        const double (*rest_q)[3],
+                                                        const struct groom_anchor *anchors, size_t n_anchors,
+                                                        const struct groom_sculpt_options *options,
+                                                        const struct groom_context *context,
+                                                        struct groom_sculpt_outcome *outcomes,
+                                                        struct groom_diag *diag);
+
 #ifdef __cplusplus
 }
 #endif
