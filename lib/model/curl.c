@@ -41,7 +41,7 @@ LANES_INLINE void curl_forward(const struct kernel_inputs *in, const lanes *rest
         {
             float v = at[j][l] * inverse[l], sine, cosine;
             float size = radius * (RADIUS_AT_ROOT + RADIUS_GROWTH * v) * lane_sigmoid(START_STEEPNESS * (v - start));
-            lane_sincos_turns(at[j][l] * rate[l] + shift[l], &sine, &cosine);
+            lane_sincos_turns(at_most(at[j][l] * rate[l] + shift[l], MANY_TURNS), &sine, &cosine);
             float along_n = size * sine, along_b = size * cosine;
             q[0][l] = p[0][l] + (along_n * frame[0][l] + along_b * frame[2][l]);
             q[1][l] = p[1][l] + (along_n * frame[1][l] + along_b * frame[3][l]);
@@ -68,7 +68,7 @@ LANES_INLINE void curl_backward(const struct kernel_inputs *in, const lanes *res
             float v = at[j][l] * inverse[l], sine, cosine;
             float growth = RADIUS_AT_ROOT + RADIUS_GROWTH * v, begun = lane_sigmoid(START_STEEPNESS * (v - start));
             float size = radius * growth * begun;
-            lane_sincos_turns(at[j][l] * rate[l] + shift[l], &sine, &cosine);
+            lane_sincos_turns(at_most(at[j][l] * rate[l] + shift[l], MANY_TURNS), &sine, &cosine);
             float dx = dp[0][l], dy = dp[1][l], dz = dp[2][l];
             float on_n = dx * frame[0][l] + dy * frame[1][l];
             float on_b = dx * frame[2][l] + dy * frame[3][l] + dz * frame[4][l];

@@ -8,6 +8,11 @@ enum { FREQUENCY, AMPLITUDE };
 
 #define RANDOM_SHIFT 10.0f
 
+LANES_INLINE float place_in_noise(float frequency, float at, float u)
+{
+    return at_most(frequency * at, MANY_TURNS) + RANDOM_SHIFT * u;
+}
+
 LANES_INLINE void frizz_forward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,
                                 lanes *restrict scratch)
 {
@@ -21,7 +26,7 @@ LANES_INLINE void frizz_forward(const struct kernel_inputs *in, const lanes *res
         for (uint32_t j = 1; j < m; j++)
             FOR_LANES(l)
             {
-                float chi = frequency * at[j][l] + RANDOM_SHIFT * in->random[0][l];
+                float chi = place_in_noise(frequency, at[j][l], in->random[0][l]);
                 y[3 * j + c][l] = x[3 * j + c][l] + half * noise_epsilon(chi + offset[c]);
             }
     }
@@ -42,7 +47,7 @@ LANES_INLINE void frizz_backward(const struct kernel_inputs *in, const lanes *re
         for (uint32_t j = 1; j < m; j++)
             FOR_LANES(l)
             {
-                float chi = frequency * at[j][l] + RANDOM_SHIFT * in->random[0][l], epsilon;
+                float chi = place_in_noise(frequency, at[j][l], in->random[0][l]), epsilon;
                 float slope = noise_epsilon_slope(chi + offset[c], &epsilon), dy = d[3 * j + c][l];
                 d_half[l] += dy * epsilon;
                 d_chi[j][l] += half * dy * slope;

@@ -34,13 +34,13 @@ struct noise_cell {
     float f, a, b, low, high; /* place in the cell, the two ramps there, their slopes */
 };
 
+/* |t| up to 2^21. Rounded to the nearest whole number first; where that is above t, one cell back. */
 LANES_INLINE struct noise_cell noise_cell_of(float t)
 {
-    float rounded = t + ROUNDER;
-    float whole = rounded - ROUNDER;
-    int32_t above = whole > t;
-    float f = clampf(t - whole + (float)above, 0.0f, 1.0f);
-    uint32_t stepped = (uint32_t)(bits_of(rounded) - bits_of(ROUNDER) - above) * NOISE_STEP;
+    float rounded = t + ROUNDER, f = t - (rounded - ROUNDER);
+    int32_t back = bits_of(f) >> 31; /* -1 or 0 */
+    uint32_t stepped = (uint32_t)(bits_of(rounded) - bits_of(ROUNDER) + back) * NOISE_STEP;
+    f += float_of(back & bits_of(1.0f));
     float low = noise_gradient(stepped), high = noise_gradient(stepped + NOISE_STEP);
     return (struct noise_cell){f, low * f, high * (f - 1.0f), low, high};
 }

@@ -27,18 +27,30 @@ static void require(groom_status status)
     }
 }
 
-/* The best of a few rounds, seconds. */
-static double time_evaluate(enum kernel_variant variant, const struct groom *groom, float (*out)[3],
-                            const struct groom_context *context)
+/* The best of some rounds over the first n strands, seconds. */
+static double time_strands(enum kernel_variant variant, const struct groom *groom, uint32_t n, int rounds,
+                           float (*out)[3], const struct groom_context *context)
 {
     double best = 1e9;
-    for (int round = 0; round < ROUNDS; round++) {
+    for (int round = 0; round < rounds; round++) {
         double start = now();
-        require(evaluate_with(variant, groom, 0, groom->n_strands, out, context, NULL));
+        require(evaluate_with(variant, groom, 0, n, out, context, NULL));
         double seconds = now() - start;
         best = seconds < best ? seconds : best;
     }
     return best;
+}
+
+static double time_evaluate(const struct groom *groom, float (*out)[3], const struct groom_context *context)
+{
+    return time_strands(kernel_best_variant(), groom, groom->n_strands, ROUNDS, out, context);
+}
+
+/* Nanoseconds a vertex in one thread: short rounds, so that the best one ran undisturbed. */
+static double vertex_ns(enum kernel_variant variant, const struct groom *groom, float (*out)[3])
+{
+    enum { SAMPLE = 4096 };
+    return 1e9 * time_strands(variant, groom, SAMPLE, 40, out, NULL) / (SAMPLE * (double)VERTICES);
 }
 
 /* Seconds that the plain double-precision reference would take for all strands on one core. */
@@ -93,26 +105,25 @@ int main(void)
     test_append_all_operators(groom, 1);
     require(groom_pool_create(2, &pool));
     struct groom_context both = {.pool = pool};
-    double vertices = (double)STRANDS * VERTICES;
 
-    double seconds = time_evaluate(kernel_best_variant(), groom, out, &both);
-    double one = time_evaluate(kernel_best_variant(), groom, out, NULL);
-    double baseline = time_evaluate(KERNEL_BASELINE, groom, out, NULL);
+    double seconds = time_evaluate(groom, out, &both), gradient = time_gradient(groom, &both);
     printf("figure evaluate_100k_seconds %.4f s 100 000 strands x 100, five operators, two threads\n", seconds);
-    double gradient = time_gradient(groom, &both);
     printf("figure gradient_100k_seconds %.4f s forward and backward, two threads\n", gradient);
     printf("figure gradient_ratio %.2f x gradient / forward\n", gradient / seconds);
-    printf("figure evaluate_100k_one_thread_seconds %.4f s one thread\n", one);
-    printf("figure evaluate_vector_ratio %.2f x baseline instruction set / best, one thread\n", baseline / one);
-    printf("figure evaluate_scalar_ratio %.1f x plain scalar reference / best, one thread\n", time_reference(groom) / one);
+
+    double best = vertex_ns(kernel_best_variant(), groom, out);
+    printf("figure evaluate_ns %.2f ns a vertex, one thread, five operators\n", best);
+    printf("figure evaluate_vector_ratio %.2f x baseline instruction set / best\n",
+           vertex_ns(KERNEL_BASELINE, groom, out) / best);
+    printf("figure evaluate_scalar_ratio %.1f x plain scalar reference / best\n",
+           1e9 * time_reference(groom) / ((double)STRANDS * VERTICES) / best);
     set_enabled(groom, GROOM_OPERATOR_COUNT);
-    double nothing = time_evaluate(kernel_best_variant(), groom, out, NULL);
-    printf("figure evaluate_instance_ns %.2f ns a vertex, one thread: instancing alone\n", 1e9 * nothing / vertices);
+    double nothing = vertex_ns(kernel_best_variant(), groom, out);
+    printf("figure evaluate_instance_ns %.2f ns a vertex: instancing alone\n", nothing);
     for (int type = 0; type < GROOM_OPERATOR_COUNT; type++) {
         set_enabled(groom, type);
-        double alone = time_evaluate(kernel_best_variant(), groom, out, NULL) - nothing;
-        printf("figure evaluate_%s_ns %.2f ns a vertex, one thread\n", groom_operator_name((groom_operator_type)type),
-               1e9 * alone / vertices);
+        printf("figure evaluate_%s_ns %.2f ns a vertex, besides\n", groom_operator_name((groom_operator_type)type),
+               vertex_ns(kernel_best_variant(), groom, out) - nothing);
     }
     groom_pool_destroy(pool);
     groom_destroy(groom);
