@@ -38,7 +38,7 @@ struct noise_cell {
 LANES_INLINE struct noise_cell noise_cell_of(float t)
 {
     float rounded = t + ROUNDER, f = t - (rounded - ROUNDER);
-    int32_t back = bits_of(f) >> 31; /* -1 or 0 */
+    int32_t back = -(int32_t)((uint32_t)bits_of(f) >> 31); /* -1 or 0 */
     uint32_t stepped = (uint32_t)(bits_of(rounded) - bits_of(ROUNDER) + back) * NOISE_STEP;
     f += float_of(back & bits_of(1.0f));
     float low = noise_gradient(stepped), high = noise_gradient(stepped + NOISE_STEP);

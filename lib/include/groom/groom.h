@@ -21,7 +21,14 @@ extern "C" {
 
 /* --- operators ------------------------------------------------------------ */
 
-/* Appendix A. Which random numbers each draws, and for how many:
+/* Appendix A, in these conventions:
+ * - lengths in metres throughout; operator guides are the undeformed guides, wherever in the chain;
+ * - v_j is arc length over length: bend counts up to and with the segment, the others to the vertex;
+ * - curl's phase is in turns; its frequencies are turns a metre of arc (the paper's 3 omega);
+ * - clump blends vertex j with the operator guide's vertex j;
+ * - frizz: model/noise.h defines the noise, its hash and the offsets of the axes, once and for all;
+ * - segments below 1e-12 m have no direction: a guide's is taken as +y there, derivatives as 0.
+ * Which random numbers each draws, and for how many:
  * X(constant, name in documents, number of random arrays, drawn for each operator guide (1) or strand (0)) */
 #define GROOM_OPERATOR_LIST(X)                                                                     \
     X(GROOM_OPERATOR_SCALE, "scale", 1, 0)                                                         \
