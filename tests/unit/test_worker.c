@@ -1,6 +1,7 @@
 /* What an attempt reads and what it makes of the daemon's answers. */
 #include <arpa/inet.h>
 #include <errno.h>
+#include <math.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,8 +9,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "groom/fit.h"
+#include "groom/sample.h"
 #include "server/worker/blob.h"
+#include "server/worker/checkpoint.h"
 #include "server/worker/order.h"
+#include "server/worker/progress_report.h"
 #include "server/worker/work_link.h"
 #include "server/worker/worker.h"
 #include "tests/support/test.h"
@@ -210,6 +215,90 @@ START_TEST(blob_comes_from_a_shared_folder_where_there_is_one)
 }
 END_TEST
 
+/* --- progress and checkpoints ----------------------------------------------------------------- */
+
+static struct groom_fit *small_fit(void)
+{
+    struct groom_sample_options sample_options;
+    struct groom_sample *sample;
+    struct groom_fit_options *options = malloc(sizeof *options);
+    struct groom_fit *fit;
+    groom_sample_options_init(GROOM_SAMPLE_SHORT, &sample_options);
+    sample_options.n_strands = 60;
+    sample_options.n_guides = 10;
+    sample_options.n_operator_guides = 3;
+    ck_ok(groom_sample_create(&sample_options, NULL, &sample, NULL));
+    groom_fit_options_init(GROOM_FIT_DRAFT, options);
+    options->vertices = 20;
+    options->guides = 10;
+    ck_ok(groom_fit_create(sample->capture, NULL, options, NULL, &fit, NULL));
+    groom_sample_destroy(sample);
+    free(options);
+    return fit;
+}
+
+START_TEST(progress_is_told_from_the_fit_alone)
+{
+    struct progress_report report;
+    struct groom_fit *fit = small_fit();
+    progress_report_init(&report, NULL);
+    char *text = progress_report_text(&report, 0);
+    ck_assert_str_eq(text, "{\"losses\":[]}");
+    free(text);
+    progress_report_follow(&report, fit);
+    report.callbacks.loss(report.callbacks.user, "cluster", 3, 0.5);
+    report.callbacks.loss(report.callbacks.user, "cluster", 4, NAN);
+    text = progress_report_text(&report, report.started_s + 1);
+    ck_assert_ptr_nonnull(strstr(text, "\"stage\":{\"name\":\"initialize\",\"index\":0,"));
+    ck_assert_ptr_nonnull(strstr(text, "\"progress\":0,"));
+    ck_assert_ptr_nonnull(
+        strstr(text, "[{\"stage\":\"initialize\",\"iteration\":3,\"name\":\"cluster\",\"value\":0.5}]"));
+    ck_assert_ptr_null(strstr(text, "eta_s"));
+    free(text);
+    while (!groom_fit_done(fit))
+        ck_ok(groom_fit_step(fit, NULL, NULL));
+    text = progress_report_text(&report, report.started_s + 1);
+    ck_assert_ptr_nonnull(strstr(text, "\"progress\":1,\"eta_s\":0,"));
+    free(text);
+    groom_fit_destroy(fit);
+}
+END_TEST
+
+START_TEST(losses_are_thinned_and_the_newest_kept)
+{
+    struct progress_report report;
+    progress_report_init(&report, NULL);
+    for (uint64_t i = 0; i < 100000; i++)
+        report.callbacks.loss(report.callbacks.user, "total", i, 1);
+    ck_assert_uint_le(report.n_losses, PROGRESS_MAX_LOSSES);
+    ck_assert_uint_gt(report.n_losses, PROGRESS_MAX_LOSSES / 4);
+    ck_assert_uint_eq(report.losses[report.n_losses - 1].iteration, 99999);
+    ck_assert_uint_eq(report.losses[0].iteration, 0);
+}
+END_TEST
+
+START_TEST(a_checkpoint_that_does_not_fit_is_passed_over)
+{
+    char path[] = "/tmp/checkpoint_XXXXXX";
+    int fd = mkstemp(path);
+    struct work_link link;
+    struct order_blob name = {.sha256 = ABC_SHA256, .n_bytes = 3};
+    struct groom_fit *fit = small_fit();
+    struct groom_fit_progress progress;
+    ck_assert_int_eq(write(fd, "abc", 3), 3);
+    close(fd);
+    snprintf(name.path, sizeof name.path, "%s", path);
+    ck_assert(work_link_open(&link, "http://127.0.0.1:9", "t", &no_stop));
+    ck_ok(checkpoints_load(fit, &name, &link, NULL, NULL));
+    groom_fit_progress(fit, &progress);
+    ck_assert(progress.fraction == 0);
+    ck_assert_uint_eq(checkpoints_stage(fit), 0);
+    groom_fit_destroy(fit);
+    work_link_close(&link);
+    unlink(path);
+}
+END_TEST
+
 /* --- command lines and problems ---------------------------------------------------------------- */
 
 START_TEST(counts_are_whole_numbers_in_range)
@@ -291,4 +380,6 @@ TEST_SUITE("worker", order_reads_inputs_options_and_checkpoint, order_refuses_wh
            link_stops_waiting_when_the_process_is_to_end, blob_is_verified_and_a_broken_line_taken_up_again,
            blob_of_other_bytes_is_refused, blob_comes_from_a_shared_folder_where_there_is_one,
            counts_are_whole_numbers_in_range, problem_carries_offset_and_pointer,
-           sandbox_leaves_threads_and_memory_and_no_way_out, input_is_read_whole_from_a_pipe_within_its_limit)
+           sandbox_leaves_threads_and_memory_and_no_way_out, progress_is_told_from_the_fit_alone,
+           losses_are_thinned_and_the_newest_kept, a_checkpoint_that_does_not_fit_is_passed_over,
+           input_is_read_whole_from_a_pipe_within_its_limit)
