@@ -1,0 +1,213 @@
+/* What holds for the fit of any capture: each style of the generator, and real files where they are. */
+#include <fcntl.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "fit/assign.h"
+#include "fit/state.h"
+#include "groom/format.h"
+#include "groom/mesh.h"
+#include "groom/sample.h"
+#include "groom/strands.h"
+#include "tests/support/test.h"
+
+static struct groom_fit *fitted(const struct groom_strands *strands, const struct groom_mesh *head,
+                                const struct groom_fit_options *options)
+{
+    struct groom_pool *pool;
+    struct groom_fit *fit;
+    struct groom_diag diag = {0};
+    ck_ok(groom_pool_create(2, &pool));
+    struct groom_context context = {.pool = pool};
+    groom_status st = groom_fit_create(strands, head, options, &context, &fit, &diag);
+    while (st == GROOM_OK && !groom_fit_done(fit))
+        st = groom_fit_step(fit, &context, &diag);
+    ck_assert_msg(st == GROOM_OK, "%s: %s", groom_status_name(st), diag.detail);
+    groom_pool_destroy(pool);
+    return fit;
+}
+
+static float (*dense_of(const struct groom_fit *fit, int with_operators))[3]
+{
+    float (*dense)[3] = malloc((size_t)fit->n * fit->m * sizeof *dense);
+    struct groom *groom;
+    ck_ok(groom_fit_result(fit, NULL, &groom, NULL));
+    while (!with_operators && groom->n_operators > 0)
+        ck_ok(groom_remove_operator(groom, groom->n_operators - 1, NULL));
+    ck_ok(groom_evaluate(groom, 0, groom->n_strands, dense, NULL, NULL));
+    groom_destroy(groom);
+    return dense;
+}
+
+/* Mean square distance of the strands without operators from the target, over that of a bald head. */
+static double unexplained(const struct groom_fit *fit)
+{
+    float (*dense)[3] = dense_of(fit, 0);
+    double error = 0, all = 0;
+    for (size_t v = 0; v < (size_t)fit->n * fit->m; v++)
+        for (int c = 0; c < 3; c++) {
+            double x = fit->centre[c] + (double)fit->scale * fit->target[v][c], root = fit->roots[v / fit->m][c];
+            error += (dense[v][c] - x) * (dense[v][c] - x);
+            all += (x - root) * (x - root);
+        }
+    free(dense);
+    return error / all;
+}
+
+/* The whole groom, operators and all: finite, and of the size of the capture. */
+static void is_sane(const struct groom_fit *fit)
+{
+    float (*dense)[3] = dense_of(fit, 1);
+    double square = 0;
+    ck_ok(groom_validate(fit->groom, NULL));
+    for (size_t v = 0; v < (size_t)fit->n * fit->m; v++)
+        for (int c = 0; c < 3; c++) {
+            double x = (dense[v][c] - fit->centre[c]) / fit->scale;
+            ck_assert(isfinite(x));
+            square += x * x;
+        }
+    ck_assert_double_gt(square / ((double)fit->n * fit->m), 0.7);
+    ck_assert_double_lt(square / ((double)fit->n * fit->m), 1.4);
+    free(dense);
+}
+
+/* Operator guides stand among the guides; medoids and clusters have members. */
+static void is_well_made(const struct groom_fit *fit)
+{
+    const struct groom *groom = fit->groom;
+    uint32_t *members = calloc(fit->n_guides, sizeof *members);
+    for (uint32_t i = 0; i < fit->n; i++)
+        members[fit->cluster_of[i]]++;
+    for (uint32_t g = 0; g < fit->n_guides; g++)
+        ck_assert_uint_gt(members[g], 0);
+    for (uint32_t o = 1; o < groom->n_operator_guides; o++)
+        ck_assert_uint_gt(groom->operator_guide[o], groom->operator_guide[o - 1]);
+    free(members);
+}
+
+static void fits(const struct groom_strands *strands, const struct groom_mesh *head, double most_unexplained,
+                 const char *what)
+{
+    struct groom_fit_options options;
+    groom_fit_options_init(GROOM_FIT_DRAFT, &options);
+    options.vertices = 40;
+    struct groom_fit *fit = fitted(strands, head, &options);
+    double left = unexplained(fit);
+    ck_assert_msg(left < most_unexplained, "%s: %g of it unexplained", what, left);
+    is_sane(fit);
+    is_well_made(fit);
+    ck_assert_uint_eq(fit->groom->n_strands, strands->n_strands);
+    groom_fit_destroy(fit);
+}
+
+/* The bounds are one and a half times what is measured: most of it is strands at the parting, which
+ * instancing by distance blends from both sides. */
+START_TEST(every_style_is_fitted)
+{
+    static const double most[GROOM_SAMPLE_STYLE_COUNT] = {
+        [GROOM_SAMPLE_STRAIGHT] = 0.05, [GROOM_SAMPLE_WAVY] = 0.035, [GROOM_SAMPLE_CURLY] = 0.04,
+        [GROOM_SAMPLE_COILY] = 0.05, [GROOM_SAMPLE_SHORT] = 0.08, [GROOM_SAMPLE_SPIKY] = 0.12,
+        [GROOM_SAMPLE_BENT] = 0.09};
+    struct groom_sample_options options;
+    struct groom_sample *sample;
+    groom_sample_style style = (groom_sample_style)_i;
+    groom_sample_options_capture(style, &options);
+    options.n_strands = 2500;
+    options.n_vertices = 50;
+    ck_ok(groom_sample_create(&options, NULL, &sample, NULL));
+    fits(sample->capture, sample->head, most[style], groom_sample_style_name(style));
+    fits(sample->capture, NULL, 1.5 * most[style], groom_sample_style_name(style));
+    groom_sample_destroy(sample);
+}
+END_TEST
+
+/* Strands that the fit clumps go into the head no oftener than the truth's. */
+START_TEST(few_strands_are_pulled_into_the_head)
+{
+    struct groom_sample_options options;
+    struct groom_sample *sample;
+    struct groom_fit_options fit_options;
+    groom_sample_options_init(GROOM_SAMPLE_STRAIGHT, &options);
+    options.n_strands = 3000;
+    ck_ok(groom_sample_create(&options, NULL, &sample, NULL));
+    groom_fit_options_init(GROOM_FIT_DRAFT, &fit_options);
+    struct groom_fit *fit = fitted(sample->capture, sample->head, &fit_options);
+    const struct groom_fit_report *report = groom_fit_get_report(fit);
+    ck_assert_uint_gt(report->n_reassigned, 0);
+    ck_assert_uint_lt(report->n_penetrating, sample->capture->n_strands / 20);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
+/* --- real captures ------------------------------------------------------------------- */
+
+static struct groom_frame frame_of(double unit_m, groom_up up) { return (struct groom_frame){unit_m, up}; }
+
+static struct groom_strands *read_strands(const char *path, struct groom_frame frame)
+{
+    struct groom_read_options options = {.frame = frame};
+    struct groom_strands *strands;
+    struct groom_diag diag = {0};
+    int file = open(path, O_RDONLY);
+    struct groom_source source = groom_source_from_fd(file);
+    groom_status st = groom_strands_read(&source, &options, NULL, &strands, NULL, &diag);
+    ck_assert_msg(st == GROOM_OK, "%s: %s", path, diag.detail);
+    close(file);
+    return strands;
+}
+
+static struct groom_mesh *read_head(const char *path, struct groom_frame frame)
+{
+    struct groom_mesh_read_options options = {.frame = frame};
+    struct groom_mesh *head;
+    struct groom_diag diag = {0};
+    int file = open(path, O_RDONLY);
+    struct groom_source source = groom_source_from_fd(file);
+    groom_status st = groom_mesh_read(&source, &options, NULL, &head, NULL, &diag);
+    ck_assert_msg(st == GROOM_OK, "%s: %s", path, diag.detail);
+    close(file);
+    return head;
+}
+
+START_TEST(real_captures_are_fitted)
+{
+    static const struct { const char *strands, *head; double unit_m; groom_up up; double most; } rows[] = {
+        {"harolongo/hair.data", "harolongo/body.obj", 0.01, GROOM_UP_Y, 0.05},
+        {"sintel/hair.tfx", "sintel/head.obj", 1, GROOM_UP_Y, 0.14},
+        {"combover/hair.data", "combover/body.obj", 1, GROOM_UP_Z, 0.45},
+        {"mohawk/hair.tfx", NULL, 1, GROOM_UP_Y, 0.08},
+        {"bangs100/Bangs_100.data", NULL, 0.001, GROOM_UP_Z, 0.45},
+    };
+    const char *path = test_shared_data(rows[_i].strands);
+    if (!path)
+        return;
+    struct groom_frame frame = frame_of(rows[_i].unit_m, rows[_i].up);
+    struct groom_strands *strands = read_strands(path, frame);
+    struct groom_mesh *head = rows[_i].head ? read_head(test_shared_data(rows[_i].head), frame) : NULL;
+    fits(strands, head, rows[_i].most, rows[_i].strands);
+    groom_mesh_destroy(head);
+    groom_strands_destroy(strands);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("fit_property");
+    TCase *styles = tcase_create("styles"), *real = tcase_create("real");
+    tcase_set_timeout(styles, 300);
+    tcase_set_timeout(real, 300);
+    tcase_add_loop_test(styles, every_style_is_fitted, 0, GROOM_SAMPLE_STYLE_COUNT);
+    tcase_add_test(styles, few_strands_are_pulled_into_the_head);
+    tcase_add_loop_test(real, real_captures_are_fitted, 0, 5);
+    suite_add_tcase(suite, styles);
+    suite_add_tcase(suite, real);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed != 0;
+}
