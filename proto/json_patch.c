@@ -89,7 +89,8 @@ static int equal_objects(const cJSON *a, const cJSON *b)
     const cJSON *member;
     if (cJSON_GetArraySize(a) != cJSON_GetArraySize(b))
         return 0;
-    cJSON_ArrayForEach(member, a) {
+    cJSON_ArrayForEach(member, a)
+    {
         const cJSON *other = cJSON_GetObjectItemCaseSensitive(b, member->string);
         if (!other || !json_equal(member, other))
             return 0;
@@ -113,9 +114,9 @@ int json_equal(const cJSON *a, const cJSON *b)
 /* --- operations ------------------------------------------------------------------ */
 
 struct application {
-    cJSON *document;    /* the copy that is being changed */
-    int index;          /* of the operation */
-    size_t copied;      /* bytes that "copy" has added so far: copying a document into itself doubles it */
+    cJSON *document; /* the copy that is being changed */
+    int index;       /* of the operation */
+    size_t copied;   /* bytes that "copy" has added so far: copying a document into itself doubles it */
     struct json_patch_error *error;
 };
 
@@ -184,7 +185,8 @@ static int depth_of(const cJSON *item)
 {
     int deepest = 0;
     const cJSON *child;
-    cJSON_ArrayForEach(child, item) {
+    cJSON_ArrayForEach(child, item)
+    {
         int depth = depth_of(child);
         deepest = depth > deepest ? depth : deepest;
     }
@@ -207,7 +209,8 @@ static enum json_patch_status add(struct application *a, const char *path, cJSON
         return no_memory(a);
     if (tokens_of(path) + depth_of(value) > JSON_PATCH_MAX_DEPTH) {
         cJSON_Delete(value);
-        return refuse(a, JSON_PATCH_INVALID, "/path", "the result would be nested deeper than %d", JSON_PATCH_MAX_DEPTH);
+        return refuse(a, JSON_PATCH_INVALID, "/path", "the result would be nested deeper than %d",
+                      JSON_PATCH_MAX_DEPTH);
     }
     if (!*path) {
         cJSON_Delete(a->document);
@@ -229,7 +232,8 @@ static enum json_patch_status add(struct application *a, const char *path, cJSON
 }
 
 /* Take out what stands at the path; *value is then the caller's. */
-static enum json_patch_status detach(struct application *a, const char *member, const char *path, cJSON **value)
+static enum json_patch_status detach(struct application *a, const char *member, const char *path,
+                                     cJSON **value)
 {
     char token[256];
     cJSON *parent = *path ? parent_of(a->document, path, token, sizeof token) : NULL;
@@ -242,13 +246,15 @@ static enum json_patch_status detach(struct application *a, const char *member, 
     return JSON_PATCH_OK;
 }
 
-static enum json_patch_status apply_add(struct application *a, const char *path, const char *from, const cJSON *value)
+static enum json_patch_status apply_add(struct application *a, const char *path, const char *from,
+                                        const cJSON *value)
 {
     (void)from;
     return add(a, path, cJSON_Duplicate(value, 1));
 }
 
-static enum json_patch_status apply_remove(struct application *a, const char *path, const char *from, const cJSON *value)
+static enum json_patch_status apply_remove(struct application *a, const char *path, const char *from,
+                                           const cJSON *value)
 {
     cJSON *gone = NULL;
     (void)from, (void)value;
@@ -257,13 +263,15 @@ static enum json_patch_status apply_remove(struct application *a, const char *pa
     return status;
 }
 
-static enum json_patch_status apply_replace(struct application *a, const char *path, const char *from, const cJSON *value)
+static enum json_patch_status apply_replace(struct application *a, const char *path, const char *from,
+                                            const cJSON *value)
 {
     enum json_patch_status status = *path ? apply_remove(a, path, from, value) : JSON_PATCH_OK;
     return status == JSON_PATCH_OK ? apply_add(a, path, from, value) : status;
 }
 
-static enum json_patch_status apply_move(struct application *a, const char *path, const char *from, const cJSON *value)
+static enum json_patch_status apply_move(struct application *a, const char *path, const char *from,
+                                         const cJSON *value)
 {
     size_t n = strlen(from);
     (void)value;
@@ -281,23 +289,25 @@ static size_t weight_of(const cJSON *item)
     const cJSON *child;
     size_t weight = sizeof *item + (cJSON_IsString(item) ? strlen(item->valuestring) : 0) +
                     (item->string ? strlen(item->string) : 0);
-    cJSON_ArrayForEach(child, item)
-        weight += weight_of(child);
+    cJSON_ArrayForEach(child, item) weight += weight_of(child);
     return weight;
 }
 
-static enum json_patch_status apply_copy(struct application *a, const char *path, const char *from, const cJSON *value)
+static enum json_patch_status apply_copy(struct application *a, const char *path, const char *from,
+                                         const cJSON *value)
 {
     const cJSON *found = json_pointer_get(a->document, from);
     (void)value;
     if (!found)
         return missing(a, "/from", from);
     if ((a->copied += weight_of(found)) > JSON_PATCH_MAX_COPIED)
-        return refuse(a, JSON_PATCH_INVALID, "/op", "the patch copies more than %d bytes", JSON_PATCH_MAX_COPIED);
+        return refuse(a, JSON_PATCH_INVALID, "/op", "the patch copies more than %d bytes",
+                      JSON_PATCH_MAX_COPIED);
     return add(a, path, cJSON_Duplicate(found, 1));
 }
 
-static enum json_patch_status apply_test(struct application *a, const char *path, const char *from, const cJSON *value)
+static enum json_patch_status apply_test(struct application *a, const char *path, const char *from,
+                                         const cJSON *value)
 {
     const cJSON *found = json_pointer_get(a->document, path);
     (void)from;
@@ -311,10 +321,11 @@ static enum json_patch_status apply_test(struct application *a, const char *path
 static const struct operation {
     const char *name;
     int needs_from, needs_value;
-    enum json_patch_status (*apply)(struct application *, const char *path, const char *from, const cJSON *value);
+    enum json_patch_status (*apply)(struct application *, const char *path, const char *from,
+                                    const cJSON *value);
 } operations[] = {
-    {"add", 0, 1, apply_add},         {"remove", 0, 0, apply_remove}, {"replace", 0, 1, apply_replace},
-    {"move", 1, 0, apply_move},       {"copy", 1, 0, apply_copy},     {"test", 0, 1, apply_test},
+    {"add", 0, 1, apply_add},   {"remove", 0, 0, apply_remove}, {"replace", 0, 1, apply_replace},
+    {"move", 1, 0, apply_move}, {"copy", 1, 0, apply_copy},     {"test", 0, 1, apply_test},
 };
 
 static const struct operation *find_operation(const char *name)
@@ -335,7 +346,8 @@ static enum json_patch_status pointer_member(const struct application *a, const 
     if (!*pointer)
         return refuse(a, JSON_PATCH_INVALID, member, "the operation needs \"%s\", a JSON pointer", key);
     if (**pointer && **pointer != '/')
-        return refuse(a, JSON_PATCH_INVALID, member, "\"%.100s\" is not a JSON pointer; it must begin with /", *pointer);
+        return refuse(a, JSON_PATCH_INVALID, member, "\"%.100s\" is not a JSON pointer; it must begin with /",
+                      *pointer);
     return JSON_PATCH_OK;
 }
 
@@ -348,7 +360,8 @@ static enum json_patch_status apply_one(struct application *a, const cJSON *item
     const struct operation *op =
         find_operation(cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(item, "op")));
     if (!op)
-        return refuse(a, JSON_PATCH_INVALID, "/op", "\"op\" must be add, remove, replace, move, copy or test");
+        return refuse(a, JSON_PATCH_INVALID, "/op",
+                      "\"op\" must be add, remove, replace, move, copy or test");
     if ((status = pointer_member(a, item, "path", &path)) != JSON_PATCH_OK)
         return status;
     if (op->needs_from && (status = pointer_member(a, item, "from", &from)) != JSON_PATCH_OK)
@@ -368,10 +381,12 @@ enum json_patch_status json_patch_apply(const cJSON *document, const cJSON *patc
     if (!cJSON_IsArray(patch))
         return refuse(&a, JSON_PATCH_INVALID, "", "a JSON Patch is an array of operations");
     if (cJSON_GetArraySize(patch) > JSON_PATCH_MAX_OPERATIONS)
-        return refuse(&a, JSON_PATCH_INVALID, "", "a patch may have %d operations", JSON_PATCH_MAX_OPERATIONS);
+        return refuse(&a, JSON_PATCH_INVALID, "", "a patch may have %d operations",
+                      JSON_PATCH_MAX_OPERATIONS);
     if (!(a.document = cJSON_Duplicate(document, 1)))
         return no_memory(&a);
-    cJSON_ArrayForEach(item, patch) {
+    cJSON_ArrayForEach(item, patch)
+    {
         a.index++;
         if ((status = apply_one(&a, item)) != JSON_PATCH_OK) {
             cJSON_Delete(a.document);
@@ -387,7 +402,8 @@ enum json_patch_status json_patch_apply(const cJSON *document, const cJSON *patc
 static int merge_members(cJSON *target, const cJSON *patch)
 {
     const cJSON *member;
-    cJSON_ArrayForEach(member, patch) {
+    cJSON_ArrayForEach(member, patch)
+    {
         if (cJSON_IsNull(member)) {
             cJSON_DeleteItemFromObjectCaseSensitive(target, member->string);
             continue;
@@ -408,7 +424,8 @@ cJSON *json_merge_patch(const cJSON *document, const cJSON *patch)
 {
     if (!cJSON_IsObject(patch))
         return cJSON_Duplicate(patch, 1);
-    cJSON *target = document && cJSON_IsObject(document) ? cJSON_Duplicate(document, 1) : cJSON_CreateObject();
+    cJSON *target =
+        document && cJSON_IsObject(document) ? cJSON_Duplicate(document, 1) : cJSON_CreateObject();
     if (target && merge_members(target, patch))
         return target;
     cJSON_Delete(target);

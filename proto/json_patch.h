@@ -10,8 +10,8 @@
 struct cJSON;
 
 #define JSON_PATCH_MAX_OPERATIONS 1000
-#define JSON_PATCH_MAX_DEPTH 128         /* of what an operation leaves behind */
-#define JSON_PATCH_MAX_COPIED (64 << 20) /* bytes that all "copy" operations together may add */
+#define JSON_PATCH_MAX_DEPTH      128        /* of what an operation leaves behind */
+#define JSON_PATCH_MAX_COPIED     (64 << 20) /* bytes that all "copy" operations together may add */
 
 enum json_patch_status {
     JSON_PATCH_OK = 0,

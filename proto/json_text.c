@@ -28,10 +28,14 @@ static size_t utf8_length(const unsigned char *s, size_t left)
     size_t n = s[0] < 0x80 ? 1 : s[0] < 0xc2 ? 0 : s[0] < 0xe0 ? 2 : s[0] < 0xf0 ? 3 : s[0] < 0xf5 ? 4 : 0;
     if (n == 0 || n > left)
         return 0;
-    if (s[0] == 0xe0) low = 0xa0;
-    if (s[0] == 0xed) high = 0x9f;
-    if (s[0] == 0xf0) low = 0x90;
-    if (s[0] == 0xf4) high = 0x8f;
+    if (s[0] == 0xe0)
+        low = 0xa0;
+    if (s[0] == 0xed)
+        high = 0x9f;
+    if (s[0] == 0xf0)
+        low = 0x90;
+    if (s[0] == 0xf4)
+        high = 0x8f;
     for (size_t i = 1; i < n; i++, low = 0x80, high = 0xbf)
         if (s[i] < low || s[i] > high)
             return 0;
@@ -43,7 +47,8 @@ static size_t scan_string(const char *bytes, size_t n, size_t at, struct json_te
 {
     for (at++; at < n && bytes[at] != '"';) {
         if ((unsigned char)bytes[at] < 0x20)
-            return (size_t)refuse(error, at, "a string holds the control character 0x%02x; write it as \\u00%02x",
+            return (size_t)refuse(error, at,
+                                  "a string holds the control character 0x%02x; write it as \\u00%02x",
                                   (unsigned)bytes[at], (unsigned)bytes[at]);
         if (bytes[at] == '\\') {
             if (n - at >= 6 && !memcmp(bytes + at, "\\u0000", 6))
@@ -91,7 +96,8 @@ static int check_keys(const cJSON *object, struct json_text_error *error)
     size_t n = 0;
     int fine = keys != NULL || refuse(error, 0, "memory ran out");
     if (fine)
-        cJSON_ArrayForEach(member, object) {
+        cJSON_ArrayForEach(member, object)
+        {
             if (n == JSON_TEXT_MEMBERS) {
                 fine = refuse(error, 0, "an object has more than %d members", JSON_TEXT_MEMBERS);
                 break;
@@ -114,9 +120,7 @@ static int check_tree(const cJSON *item, struct json_text_error *error)
         return refuse(error, 0, "a number is too large for a 64-bit float");
     if (cJSON_IsObject(item) && item->child && item->child->next && !check_keys(item, error))
         return 0;
-    cJSON_ArrayForEach(child, item)
-        if (!check_tree(child, error))
-            return 0;
+    cJSON_ArrayForEach(child, item) if (!check_tree(child, error)) return 0;
     return 1;
 }
 
@@ -128,7 +132,9 @@ static cJSON *parse(const char *bytes, size_t n, struct json_text_error *error)
     size_t at = end && end >= bytes ? (size_t)(end - bytes) : 0;
     if (!tree) {
         /* cJSON stays on the last byte where the text ends early */
-        refuse(error, at, at + 1 >= n ? "this is not JSON, or it ends before the value is complete" : "this is not JSON");
+        refuse(error, at,
+               at + 1 >= n ? "this is not JSON, or it ends before the value is complete"
+                           : "this is not JSON");
         return NULL;
     }
     while (at < n && strchr(" \t\r\n", bytes[at]))

@@ -12,7 +12,7 @@
 
 struct cJSON;
 
-#define JSON_TEXT_DEPTH 64
+#define JSON_TEXT_DEPTH   64
 #define JSON_TEXT_MEMBERS 4096
 
 struct json_text_error {

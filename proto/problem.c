@@ -35,7 +35,8 @@ cJSON *problem_to_json(const struct problem *problem)
         add_text(object, "detail", problem->detail) && add_text(object, "instance", problem->instance) &&
         add_text(object, "request", problem->request) && add_text(object, "pointer", problem->pointer) &&
         add_text(object, "parameter", problem->parameter) &&
-        (problem->byte_offset < 0 || cJSON_AddNumberToObject(object, "byte_offset", (double)problem->byte_offset)))
+        (problem->byte_offset < 0 ||
+         cJSON_AddNumberToObject(object, "byte_offset", (double)problem->byte_offset)))
         return object;
     cJSON_Delete(object);
     return NULL;

@@ -16,15 +16,15 @@
 struct cJSON;
 
 struct problem {
-    int status;           /* HTTP status, 400..599 */
-    char name[48];        /* "invalid-file": stable; the `type` is "/problems/" and this */
-    char title[128];      /* what the name means, the same for every occurrence */
-    char detail[512];     /* a sentence for the person who must mend it */
-    char pointer[128];    /* JSON pointer of the refused field, or "" */
-    char parameter[48];   /* query parameter that was refused, or "" */
-    char instance[160];   /* path of the request, or "" */
-    char request[40];     /* id of the request, as the log has it, or "" */
-    int64_t byte_offset;  /* where in the body, or -1 */
+    int status;          /* HTTP status, 400..599 */
+    char name[48];       /* "invalid-file": stable; the `type` is "/problems/" and this */
+    char title[128];     /* what the name means, the same for every occurrence */
+    char detail[512];    /* a sentence for the person who must mend it */
+    char pointer[128];   /* JSON pointer of the refused field, or "" */
+    char parameter[48];  /* query parameter that was refused, or "" */
+    char instance[160];  /* path of the request, or "" */
+    char request[40];    /* id of the request, as the log has it, or "" */
+    int64_t byte_offset; /* where in the body, or -1 */
 };
 
 #define PROBLEM_MEDIA_TYPE "application/problem+json"

@@ -8,8 +8,8 @@
 
 #include <stddef.h>
 
-#define URI_MAX_LENGTH 8192
-#define URI_MAX_SEGMENTS 16
+#define URI_MAX_LENGTH     8192
+#define URI_MAX_SEGMENTS   16
 #define URI_MAX_PARAMETERS 32
 
 struct uri_parameter {

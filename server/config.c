@@ -8,8 +8,8 @@
 
 enum type {
     TEXT,
-    COUNT,  /* a whole number */
-    BYTES,  /* with K, M, G or T behind it, of 1024 */
+    COUNT, /* a whole number */
+    BYTES, /* with K, M, G or T behind it, of 1024 */
     SECONDS,
     LEVEL
 };
@@ -24,8 +24,9 @@ struct option {
 };
 
 #define AT(member) offsetof(struct config, member)
-#define ANY UINT64_MAX
+#define ANY        UINT64_MAX
 
+/* clang-format off */
 static const struct option options[] = {
     {"data", "DIR", TEXT, AT(data), "groomd-data", 0, 0, "folder of the database and the uploads; is made"},
     {"listen", "HOST:PORT", TEXT, AT(listen), "127.0.0.1:8080", 0, 0,
@@ -42,6 +43,7 @@ static const struct option options[] = {
     {"max-upload", "BYTES", BYTES, AT(max_upload), "4G", 1024, ANY, "largest body of an upload"},
     {"max-body", "BYTES", BYTES, AT(max_body), "1M", 1024, 1 << 30, "largest body of a control message (JSON)"},
     {"min-free", "BYTES", BYTES, AT(min_free), "256M", 0, ANY, "not ready, and no uploads, below this on the disk"},
+    {"export-cache", "BYTES", BYTES, AT(export_cache), "1G", 0, ANY, "disk for exports that may be asked for again"},
     {"parse-time", "SECONDS", SECONDS, AT(parse_time_s), "120", 1, 86400, "time to parse or convert one upload"},
     {"parse-memory", "BYTES", BYTES, AT(parse_memory), "16G", 1 << 26, ANY, "address space to parse or convert one upload"},
     {"connections", "N", COUNT, AT(connections), "1200", 8, 100000, "open connections"},
@@ -56,6 +58,7 @@ static const struct option options[] = {
     {"shutdown-time", "SECONDS", SECONDS, AT(shutdown_s), "8", 1, 600, "time to finish what is under way on SIGTERM"},
     {"log-level", "LEVEL", LEVEL, AT(log_level), "info", 0, 3, "error, warning, info or debug; JSON lines on standard error"},
 };
+/* clang-format on */
 #define N_OPTIONS (sizeof options / sizeof options[0])
 
 static const char *const level_names[] = {"error", "warning", "info", "debug"};
@@ -101,7 +104,8 @@ static groom_status set_text(struct config *config, const struct option *option,
                              const char *where, struct groom_diag *diag)
 {
     if (strlen(text) >= CONFIG_TEXT_SIZE)
-        return groom_fail(diag, GROOM_EINVAL, "%s: %s is longer than %d bytes", where, option->name, CONFIG_TEXT_SIZE - 1);
+        return groom_fail(diag, GROOM_EINVAL, "%s: %s is longer than %d bytes", where, option->name,
+                          CONFIG_TEXT_SIZE - 1);
     strcpy((char *)config + option->offset, text);
     return GROOM_OK;
 }
@@ -114,10 +118,13 @@ static groom_status set(struct config *config, const struct option *option, cons
     if (option->type == TEXT)
         return set_text(config, option, text, where, diag);
     if (option->type == LEVEL && !parse_level(text, &value))
-        return groom_fail(diag, GROOM_EINVAL, "%s: \"%.60s\" is not error, warning, info or debug", where, text);
+        return groom_fail(diag, GROOM_EINVAL, "%s: \"%.60s\" is not error, warning, info or debug", where,
+                          text);
     if (option->type != LEVEL && !parse_number(option->type, text, &value))
         return groom_fail(diag, GROOM_EINVAL, "%s: \"%.60s\" is not a %s", where, text,
-                          option->type == BYTES ? "number of bytes (512M, 4G)" : option->type == SECONDS ? "number of seconds" : "whole number");
+                          option->type == BYTES     ? "number of bytes (512M, 4G)"
+                          : option->type == SECONDS ? "number of seconds"
+                                                    : "whole number");
     if (value < option->minimum || value > option->maximum)
         return groom_fail(diag, GROOM_EINVAL, "%s: %.60s is outside %llu..%llu", where, text,
                           (unsigned long long)option->minimum, (unsigned long long)option->maximum);
@@ -168,7 +175,9 @@ static groom_status take_line(struct config *config, char *line, const char *whe
     name = trim(name);
     const struct option *option = find(name, strlen(name));
     if (!option || !strcmp(option->name, "config"))
-        return groom_fail(diag, GROOM_EINVAL, "%s: \"%.60s\" is not an option of a configuration file; see groomd --help", where, name);
+        return groom_fail(diag, GROOM_EINVAL,
+                          "%s: \"%.60s\" is not an option of a configuration file; see groomd --help", where,
+                          name);
     return set(config, option, trim(value), where, diag);
 }
 
@@ -178,7 +187,8 @@ static groom_status take_file(struct config *config, const char *path, struct gr
     groom_status status = GROOM_OK;
     FILE *file = fopen(path, "re");
     if (!file)
-        return groom_fail(diag, GROOM_EINVAL, "the configuration file %.200s cannot be read: %s", path, strerror(errno));
+        return groom_fail(diag, GROOM_EINVAL, "the configuration file %.200s cannot be read: %s", path,
+                          strerror(errno));
     for (int number = 1; status == GROOM_OK && fgets(line, sizeof line, file); number++) {
         snprintf(where, sizeof where, "%.120s:%d", path, number);
         status = take_line(config, line, where, diag);
@@ -212,8 +222,8 @@ static groom_status take_environment(struct config *config, char *const *environ
 }
 
 /* --name value, --name=value, --help, --version. */
-static groom_status take_arguments(struct config *config, int argc, char *const *argv, enum config_action *action,
-                                   struct groom_diag *diag)
+static groom_status take_arguments(struct config *config, int argc, char *const *argv,
+                                   enum config_action *action, struct groom_diag *diag)
 {
     for (int i = 1; i < argc; i++) {
         const char *argument = argv[i];
@@ -241,7 +251,8 @@ void config_help(FILE *out)
           "Turns dense hair strands into procedural grooms, over HTTP. The first line on standard output is\n"
           "`listening on http://HOST:PORT`. SIGTERM and SIGINT finish what is under way and stop.\n\n"
           "Each option is also a line `name = value` of the configuration file and an environment variable\n"
-          "(GROOMD_MAX_UPLOAD for --max-upload). The command line wins, then the environment, then the file.\n\n",
+          "(GROOMD_MAX_UPLOAD for --max-upload). The command line wins, then the environment, then the "
+          "file.\n\n",
           out);
     for (size_t i = 0; i < N_OPTIONS; i++) {
         char left[64];

@@ -23,7 +23,7 @@ struct config {
     char config[CONFIG_TEXT_SIZE]; /* the configuration file */
     /* counts, bytes, seconds */
     uint64_t workers, worker_threads, worker_memory, job_time_s, job_attempts;
-    uint64_t max_upload, max_body, min_free;
+    uint64_t max_upload, max_body, min_free, export_cache;
     uint64_t http_threads, fast_threads, slow_threads, slow_queue;
     uint64_t connections, idle_timeout_s, head_timeout_s, min_rate;
     uint64_t parse_time_s, parse_memory;
@@ -33,7 +33,7 @@ struct config {
 
 enum config_action {
     CONFIG_RUN,
-    CONFIG_HELP,   /* config_help was asked for */
+    CONFIG_HELP, /* config_help was asked for */
     CONFIG_VERSION
 };
 

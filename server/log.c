@@ -47,8 +47,9 @@ void log_members(enum config_log_level level, const char *message, const char *m
     if (!log_wants(level))
         return;
     time_text(when);
-    int n = snprintf(line, sizeof line - 1, "{\"time\":\"%s\",\"level\":\"%s\",\"message\":\"%s\"%s%.2000s}", when, names[level],
-                     log_escape(message, escaped, sizeof escaped), members[0] ? "," : "", members);
+    int n = snprintf(line, sizeof line - 1, "{\"time\":\"%s\",\"level\":\"%s\",\"message\":\"%s\"%s%.2000s}",
+                     when, names[level], log_escape(message, escaped, sizeof escaped), members[0] ? "," : "",
+                     members);
     line[n++] = '\n';
     ssize_t written = write(STDERR_FILENO, line, (size_t)n);
     (void)written; /* there is nowhere left to say that the log is full */

@@ -53,7 +53,8 @@ static const char *disk_trouble(const struct service *service, char *text, size_
     if (statvfs(service->temporary_folder, &disk))
         snprintf(text, capacity, "the data folder cannot be reached: %s", strerror(errno));
     else if ((uint64_t)disk.f_bavail * disk.f_frsize < service->config->min_free)
-        snprintf(text, capacity, "the disk has %llu bytes left, less than --min-free", (unsigned long long)disk.f_bavail * disk.f_frsize);
+        snprintf(text, capacity, "the disk has %llu bytes left, less than --min-free",
+                 (unsigned long long)disk.f_bavail * disk.f_frsize);
     else {
         int fd = open(service->temporary_folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
         if (fd >= 0 && write(fd, "ready?", 6) == 6) {
@@ -91,7 +92,8 @@ struct lines {
     size_t n;
 };
 
-static void add(struct lines *lines, const char *name, const char *type, const char *help, const char *state, double value)
+static void add(struct lines *lines, const char *name, const char *type, const char *help, const char *state,
+                double value)
 {
     if (lines->n == sizeof lines->line / sizeof lines->line[0])
         return;
@@ -109,7 +111,8 @@ static void add_jobs(struct lines *lines, const struct store_counts *counts)
     add(lines, "groomd_heads", "gauge", "Uploaded heads.", NULL, (double)counts->heads);
     add(lines, "groomd_grooms", "gauge", "Grooms.", NULL, (double)counts->grooms);
     add(lines, "groomd_revisions", "gauge", "Revisions of all grooms.", NULL, (double)counts->revisions);
-    add(lines, "groomd_attempts_died_total", "counter", "Attempts whose worker died, ever.", NULL, (double)counts->attempts_died);
+    add(lines, "groomd_attempts_died_total", "counter", "Attempts whose worker died, ever.", NULL,
+        (double)counts->attempts_died);
 }
 
 static void add_workers(struct lines *lines, struct supervisor *supervisor)
@@ -118,19 +121,24 @@ static void add_workers(struct lines *lines, struct supervisor *supervisor)
     supervisor_count(supervisor, &counts);
     add(lines, "groomd_worker_slots", "gauge", "Jobs that may run at a time.", NULL, counts.n_slots);
     add(lines, "groomd_workers", "gauge", "Workers that run.", NULL, counts.n_running);
-    add(lines, "groomd_worker_launches_total", "counter", "Workers launched since the start.", NULL, (double)counts.n_launched);
-    add(lines, "groomd_worker_restarts_total", "counter", "Workers that died since the start; their jobs went on in another.", NULL, (double)counts.n_died);
+    add(lines, "groomd_worker_launches_total", "counter", "Workers launched since the start.", NULL,
+        (double)counts.n_launched);
+    add(lines, "groomd_worker_restarts_total", "counter",
+        "Workers that died since the start; their jobs went on in another.", NULL, (double)counts.n_died);
 }
 
 static void add_process(struct lines *lines, struct server *server)
 {
     struct rusage usage;
     getrusage(RUSAGE_SELF, &usage);
-    add(lines, "groomd_slow_queue", "gauge", "Requests that wait for a slow thread.", NULL, (double)lane_queued(server_lane(server, LANE_SLOW)));
+    add(lines, "groomd_slow_queue", "gauge", "Requests that wait for a slow thread.", NULL,
+        (double)lane_queued(server_lane(server, LANE_SLOW)));
     add(lines, "groomd_connections", "gauge", "Open connections.", NULL, (double)server_connections(server));
     add(lines, "process_cpu_seconds_total", "counter", "Processor time of the daemon.", NULL,
-        (double)(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) + (double)(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec) * 1e-6);
-    add(lines, "process_max_resident_memory_bytes", "gauge", "Most memory that the daemon has had.", NULL, (double)usage.ru_maxrss * 1024);
+        (double)(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+            (double)(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec) * 1e-6);
+    add(lines, "process_max_resident_memory_bytes", "gauge", "Most memory that the daemon has had.", NULL,
+        (double)usage.ru_maxrss * 1024);
 }
 
 static const char *route_name(const void *user, size_t route, char *text, size_t capacity)

@@ -28,14 +28,16 @@ static const struct kind heads = {STORE_HEAD, "head", "/v1/heads", "heads"};
 static cJSON *describe(const struct store_asset *asset)
 {
     char created[32], up[2] = {asset->up, 0};
-    cJSON *object = cJSON_CreateObject(), *found = json_text_parse(asset->metadata, strlen(asset->metadata), NULL);
+    cJSON *object = cJSON_CreateObject(),
+          *found = json_text_parse(asset->metadata, strlen(asset->metadata), NULL);
     store_time_text(asset->created_ms, created);
     bool fine = object && cJSON_AddStringToObject(object, "id", asset->id) &&
                 cJSON_AddStringToObject(object, "sha256", asset->sha256) &&
                 cJSON_AddNumberToObject(object, "bytes", (double)asset->n_bytes) &&
                 cJSON_AddStringToObject(object, "name", asset->name ? asset->name : "") &&
                 cJSON_AddStringToObject(object, "format", asset->format ? asset->format : "") &&
-                cJSON_AddNumberToObject(object, "unit_m", asset->unit_m) && cJSON_AddStringToObject(object, "up", up) &&
+                cJSON_AddNumberToObject(object, "unit_m", asset->unit_m) &&
+                cJSON_AddStringToObject(object, "up", up) &&
                 cJSON_AddStringToObject(object, "created_at", created);
     for (cJSON *member = found ? found->child : NULL, *next; fine && member; member = next) {
         next = member->next;
@@ -49,7 +51,8 @@ static cJSON *describe(const struct store_asset *asset)
     return NULL;
 }
 
-static void respond_asset(struct request *request, const struct kind *kind, int status, const struct store_asset *asset)
+static void respond_asset(struct request *request, const struct kind *kind, int status,
+                          const struct store_asset *asset)
 {
     respond_json(request, status, describe(asset));
     respond_header(request, "Location", "%s/%s", kind->path, asset->id);
@@ -77,12 +80,14 @@ static bool parse_reading(struct request *request, const struct kind *kind, stru
     }
     if (kind->store == STORE_STRANDS && !tool_query_format(request, false, &format))
         return false;
-    if (kind->store == STORE_HEAD && text && strcmp(text, "auto") && groom_mesh_format_parse(text, &mesh, &diag) != GROOM_OK) {
+    if (kind->store == STORE_HEAD && text && strcmp(text, "auto") &&
+        groom_mesh_format_parse(text, &mesh, &diag) != GROOM_OK) {
         respond_bad_query(request, "format", "%s", diag.detail);
         return false;
     }
     if (text && strcmp(text, "auto"))
-        reading->format = kind->store == STORE_HEAD ? groom_mesh_format_name(mesh) : groom_format_name(format);
+        reading->format =
+            kind->store == STORE_HEAD ? groom_mesh_format_name(mesh) : groom_format_name(format);
     return tool_query_frame(request, &reading->frame);
 }
 
@@ -107,12 +112,14 @@ static void forget_blob(struct request *request, const char *sha256)
     bool removed;
     blobs_unpin(request->service->blobs, sha256);
     /* where this fails the blob is garbage, which a later collection takes */
-    if (blobs_collect(request->service->blobs, sha256, is_referenced, request->service->store, &removed, NULL) != GROOM_OK)
+    if (blobs_collect(request->service->blobs, sha256, is_referenced, request->service->store, &removed,
+                      NULL) != GROOM_OK)
         return;
 }
 
 /* groom-worker's answer about the blob; NULL where it was refused (and answered). */
-static char *inspect(struct request *request, const struct kind *kind, const struct reading *reading, const char *sha256)
+static char *inspect(struct request *request, const struct kind *kind, const struct reading *reading,
+                     const char *sha256)
 {
     int fd;
     uint64_t n_bytes;
@@ -120,8 +127,16 @@ static char *inspect(struct request *request, const struct kind *kind, const str
     char unit[40], *output = NULL;
     struct groom_diag diag = {0};
     snprintf(unit, sizeof unit, "%.17g", reading->frame.unit_m);
-    const char *const arguments[] = {"inspect", "--kind", kind->name, "--format", reading->format[0] ? reading->format : "auto",
-                                     "--unit", unit, "--up", reading->frame.up == GROOM_UP_Z ? "z" : "y", NULL};
+    const char *const arguments[] = {"inspect",
+                                     "--kind",
+                                     kind->name,
+                                     "--format",
+                                     reading->format[0] ? reading->format : "auto",
+                                     "--unit",
+                                     unit,
+                                     "--up",
+                                     reading->frame.up == GROOM_UP_Z ? "z" : "y",
+                                     NULL};
     groom_status status = blobs_read(request->service->blobs, sha256, &fd, &n_bytes, &diag);
     if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
@@ -145,7 +160,9 @@ static bool store_upload(struct request *request, const struct kind *kind, const
     asset->metadata = metadata;
     cJSON_Delete(found);
     asset->created_ms = store_now_ms();
-    groom_status status = asset->format && asset->name ? store_asset_put(request->service->store, asset, &created, &diag) : GROOM_ENOMEM;
+    groom_status status = asset->format && asset->name
+                              ? store_asset_put(request->service->store, asset, &created, &diag)
+                              : GROOM_ENOMEM;
     if (status == GROOM_OK)
         respond_asset(request, kind, created ? 201 : 200, asset);
     else
@@ -154,10 +171,14 @@ static bool store_upload(struct request *request, const struct kind *kind, const
 }
 
 /* The blob is there: find its row, or make it. */
-static void take_upload(struct request *request, const struct kind *kind, const struct reading *reading, const char *sha256, uint64_t n_bytes)
+static void take_upload(struct request *request, const struct kind *kind, const struct reading *reading,
+                        const char *sha256, uint64_t n_bytes)
 {
-    struct store_asset asset = {.kind = kind->store, .n_bytes = n_bytes, .unit_m = reading->frame.unit_m,
-                                .up = reading->frame.up == GROOM_UP_Z ? 'z' : 'y'}, known = {0};
+    struct store_asset asset = {.kind = kind->store,
+                                .n_bytes = n_bytes,
+                                .unit_m = reading->frame.unit_m,
+                                .up = reading->frame.up == GROOM_UP_Z ? 'z' : 'y'},
+                       known = {0};
     char *metadata;
     bool kept = false;
     memcpy(asset.sha256, sha256, sizeof asset.sha256);
@@ -202,7 +223,8 @@ static void post(struct request *request, const struct kind *kind)
 static bool find(struct request *request, const struct kind *kind, struct store_asset *asset)
 {
     struct groom_diag diag = {0};
-    groom_status status = store_asset_get(request->service->store, kind->store, request->parameter[0], asset, &diag);
+    groom_status status =
+        store_asset_get(request->service->store, kind->store, request->parameter[0], asset, &diag);
     if (status != GROOM_OK)
         respond_failure(request, status, &diag);
     return status == GROOM_OK;
@@ -258,11 +280,13 @@ static void respond_blob(struct request *request, const struct store_asset *asse
         return;
     }
     respond_file(request, "application/octet-stream", fd, n_bytes);
-    respond_header(request, "Content-Disposition", "attachment; filename=\"%s.%s\"", asset->id, asset->format);
+    respond_header(request, "Content-Disposition", "attachment; filename=\"%s.%s\"", asset->id,
+                   asset->format);
     respond_etag(request, "%s", asset->sha256);
 }
 
-static void convert(struct request *request, const struct store_asset *asset, groom_format format, struct groom_frame frame, const char *etag)
+static void convert(struct request *request, const struct store_asset *asset, groom_format format,
+                    struct groom_frame frame, const char *etag)
 {
     int from, to = -1;
     uint64_t n_bytes;
@@ -270,8 +294,20 @@ static void convert(struct request *request, const struct store_asset *asset, gr
     struct groom_diag diag = {0};
     snprintf(from_unit, sizeof from_unit, "%.17g", asset->unit_m);
     snprintf(unit, sizeof unit, "%.17g", frame.unit_m);
-    const char *const arguments[] = {"convert", "--from-format", asset->format, "--from-unit", from_unit, "--from-up", from_up,
-                                     "--to-format", groom_format_name(format), "--unit", unit, "--up", frame.up == GROOM_UP_Z ? "z" : "y", NULL};
+    const char *const arguments[] = {"convert",
+                                     "--from-format",
+                                     asset->format,
+                                     "--from-unit",
+                                     from_unit,
+                                     "--from-up",
+                                     from_up,
+                                     "--to-format",
+                                     groom_format_name(format),
+                                     "--unit",
+                                     unit,
+                                     "--up",
+                                     frame.up == GROOM_UP_Z ? "z" : "y",
+                                     NULL};
     groom_status status = blobs_read(request->service->blobs, asset->sha256, &from, &n_bytes, &diag);
     if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
@@ -304,7 +340,8 @@ static void strands_data(struct request *request, const struct store_asset *asse
             respond_blob(request, asset, format);
         return;
     }
-    snprintf(etag, sizeof etag, "%s-%s-%.9g-%s", asset->id, groom_format_name(format), frame.unit_m, frame.up == GROOM_UP_Z ? "z" : "y");
+    snprintf(etag, sizeof etag, "%s-%s-%.9g-%s", asset->id, groom_format_name(format), frame.unit_m,
+             frame.up == GROOM_UP_Z ? "z" : "y");
     if (!request_not_modified(request, etag))
         convert(request, asset, format, frame, etag);
 }

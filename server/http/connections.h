@@ -19,10 +19,10 @@ void connections_close(struct connections *connections, struct link *link);
 uint64_t connections_count(struct connections *connections);
 
 /* Where a connection stands. */
-void link_head(struct link *link);             /* waits for a request */
-void link_body(struct link *link);             /* a body is coming */
+void link_head(struct link *link); /* waits for a request */
+void link_body(struct link *link); /* a body is coming */
 void link_received(struct link *link, uint64_t n_bytes);
-void link_busy(struct link *link);             /* the server's turn */
+void link_busy(struct link *link); /* the server's turn */
 
 /* Shut what is too slow: no head within the time, or a body below the rate. Call once a second. */
 void connections_sweep(struct connections *connections);

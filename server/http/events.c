@@ -9,7 +9,7 @@
 #include "server/http/server.h"
 
 #define HEARTBEAT_MS 15000
-#define BATCH 256
+#define BATCH        256
 
 struct text {
     char *bytes;
@@ -20,12 +20,12 @@ struct text {
  * reader (an HTTP thread) takes them from `text`. */
 struct event_feed {
     pthread_mutex_t lock;
-    struct text text;         /* what is being sent, */
-    size_t at;                /* up to here */
+    struct text text; /* what is being sent, */
+    size_t at;        /* up to here */
     bool suspended, more, done;
     /* act's alone */
     struct text next;
-    int64_t after;            /* sequence of the last event that was read */
+    int64_t after; /* sequence of the last event that was read */
     bool was_end;
     /* fixed */
     struct follower *follower;
@@ -55,8 +55,10 @@ static bool put(struct text *text, const char *bytes, size_t n)
 static bool put_event(struct text *text, const struct store_event *event)
 {
     char head[96];
-    int n = snprintf(head, sizeof head, "id: %lld\nevent: %.40s\ndata: ", (long long)event->sequence, event->type);
-    return put(text, head, (size_t)n) && put(text, event->data, strcspn(event->data, "\r\n")) && put(text, "\n\n", 2);
+    int n = snprintf(head, sizeof head, "id: %lld\nevent: %.40s\ndata: ", (long long)event->sequence,
+                     event->type);
+    return put(text, head, (size_t)n) && put(text, event->data, strcspn(event->data, "\r\n")) &&
+           put(text, "\n\n", 2);
 }
 
 static bool job_is_over(const struct event_feed *feed)
@@ -76,7 +78,8 @@ static void read_next(struct event_feed *feed, bool *more, bool *done)
     struct store_event_list events = {0};
     feed->next.n = 0;
     feed->was_end = feed->was_end || job_is_over(feed);
-    *done = jobs_events_since(feed->service->jobs, feed->job_id, feed->after, BATCH, &events, NULL) != GROOM_OK;
+    *done =
+        jobs_events_since(feed->service->jobs, feed->job_id, feed->after, BATCH, &events, NULL) != GROOM_OK;
     for (size_t i = 0; i < events.n && put_event(&feed->next, &events.items[i]); i++)
         feed->after = events.items[i].sequence;
     *more = events.n == BATCH;
@@ -163,7 +166,8 @@ static void drop(void *user) { events_drop(user); }
 
 struct MHD_Response *events_create_response(struct event_feed *feed)
 {
-    struct MHD_Response *response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 16384, take, feed, drop);
+    struct MHD_Response *response =
+        MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 16384, take, feed, drop);
     if (!response)
         events_drop(feed);
     return response;
@@ -185,7 +189,8 @@ void events_respond(struct request *request, const char *job_id, int64_t after)
     snprintf(feed->job_id, sizeof feed->job_id, "%s", job_id);
     feed->more = true;
     bool greeted = put(&feed->text, greeting, sizeof greeting - 1);
-    groom_status status = follower_create(server_followers(request->server), job_id, act, release, feed, &feed->follower);
+    groom_status status =
+        follower_create(server_followers(request->server), job_id, act, release, feed, &feed->follower);
     if (status != GROOM_OK || !greeted) {
         if (status == GROOM_OK)
             follower_end(feed->follower);

@@ -10,6 +10,7 @@
 #include "groom/strands.h"
 #include "server/grooms/grooms.h"
 #include "server/http/handlers.h"
+#include "server/http/server.h"
 #include "server/http/tool.h"
 
 /* --- documents ------------------------------------------------------------------------- */
@@ -40,7 +41,8 @@ static void respond_revision(struct request *request, const char *groom_id, uint
 }
 
 /* An edit that came too late is a failed precondition; the rest is as it is everywhere. */
-static void respond_edit(struct request *request, groom_status status, uint32_t revision, const struct groom_diag *diag)
+static void respond_edit(struct request *request, groom_status status, uint32_t revision,
+                         const struct groom_diag *diag)
 {
     if (status == GROOM_OK)
         respond_revision(request, request->parameter[0], revision);
@@ -67,7 +69,8 @@ void grooms_call_get(struct request *request)
     struct groom_diag diag = {0};
     if (!query_revision(request, &revision) || !request_query_bool(request, "arrays", &arrays))
         return;
-    groom_status status = grooms_document(request->service->grooms, request->parameter[0], revision, arrays, &json, &n_bytes, &number, &diag);
+    groom_status status = grooms_document(request->service->grooms, request->parameter[0], revision, arrays,
+                                          &json, &n_bytes, &number, &diag);
     if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
         return;
@@ -90,7 +93,8 @@ static char *map_file(struct request *request, int fd, size_t n_bytes)
     if (n_bytes)
         respond_failure(request, GROOM_EIO, NULL);
     else
-        respond_refusal(request, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL), "the body is empty");
+        respond_refusal(request, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL),
+                        "the body is empty");
     return NULL;
 }
 
@@ -142,8 +146,10 @@ static bool patch_kind(struct request *request, enum grooms_patch_kind *kind)
     else if (type && is_type(type, "application/merge-patch+json"))
         *kind = GROOMS_MERGE_PATCH;
     else {
-        respond_refusal(request, 415, "unsupported-media-type", "the body is of a kind that this call does not take",
-                        "Content-Type is %.60s; PATCH takes application/json-patch+json or application/merge-patch+json", type ? type : "missing");
+        respond_refusal(
+            request, 415, "unsupported-media-type", "the body is of a kind that this call does not take",
+            "Content-Type is %.60s; PATCH takes application/json-patch+json or application/merge-patch+json",
+            type ? type : "missing");
         respond_header(request, "Accept-Patch", "application/json-patch+json, application/merge-patch+json");
         return false;
     }
@@ -187,10 +193,12 @@ void grooms_call_revert(struct request *request)
     bool alone = item && body->child == item && !item->next;
     cJSON_Delete(body);
     if (!whole || !alone) {
-        respond_bad_field(request, 400, "/revision", "the body must be {\"revision\":N}, N a revision to go back to");
+        respond_bad_field(request, 400, "/revision",
+                          "the body must be {\"revision\":N}, N a revision to go back to");
         return;
     }
-    groom_status status = grooms_revert(request->service->grooms, request->parameter[0], expected, (uint32_t)wanted, &number, &diag);
+    groom_status status = grooms_revert(request->service->grooms, request->parameter[0], expected,
+                                        (uint32_t)wanted, &number, &diag);
     respond_edit(request, status, number, &diag);
 }
 
@@ -201,7 +209,8 @@ void grooms_call_revisions(struct request *request)
     struct groom_diag diag = {0};
     if (!request_page(request, &page))
         return;
-    groom_status status = grooms_revisions_json(request->service->grooms, request->parameter[0], page, &json, &diag);
+    groom_status status =
+        grooms_revisions_json(request->service->grooms, request->parameter[0], page, &json, &diag);
     if (status != GROOM_OK)
         respond_failure(request, status, &diag);
     else
@@ -210,14 +219,16 @@ void grooms_call_revisions(struct request *request)
 
 /* --- what is evaluated ------------------------------------------------------------------------ */
 
-typedef groom_status (*write_strands)(struct grooms *, const char *, const struct grooms_export *, struct groom_sink, struct groom_diag *);
+typedef groom_status (*write_strands)(struct grooms *, const char *, const struct grooms_export *,
+                                      struct groom_sink, struct groom_diag *);
 
 /* The number of the revision that is meant: the latest where none is named. */
 static bool settle_revision(struct request *request, uint32_t *revision)
 {
     struct store_revision found = {0};
     struct groom_diag diag = {0};
-    groom_status status = store_revision_get(request->service->store, request->parameter[0], *revision, &found, &diag);
+    groom_status status =
+        store_revision_get(request->service->store, request->parameter[0], *revision, &found, &diag);
     if (status == GROOM_OK)
         *revision = found.number;
     else
@@ -226,17 +237,41 @@ static bool settle_revision(struct request *request, uint32_t *revision)
     return status == GROOM_OK;
 }
 
-static groom_status write_file(struct request *request, write_strands write, const struct grooms_export *what, int fd, uint64_t *n_bytes, struct groom_diag *diag)
+static groom_status write_file(struct request *request, write_strands write, const struct grooms_export *what,
+                               int fd, uint64_t *n_bytes, struct groom_diag *diag)
 {
     struct tool_sink *sink = malloc(sizeof *sink);
     if (!sink)
         return GROOM_ENOMEM;
-    groom_status status = write(request->service->grooms, request->parameter[0], what, tool_sink(sink, fd), diag);
+    groom_status status =
+        write(request->service->grooms, request->parameter[0], what, tool_sink(sink, fd), diag);
     if (status == GROOM_OK)
         status = tool_flush(sink);
     *n_bytes = sink->n_written;
     free(sink);
     return status;
+}
+
+/* The file of an export, made before or made now; -1 where that failed (and was answered). The ETag
+ * says all that it depends on but the groom. */
+static int make_export(struct request *request, write_strands write, const struct grooms_export *what,
+                       const char *etag, uint64_t *n_bytes)
+{
+    char key[160];
+    int fd;
+    struct groom_diag diag = {0};
+    struct export_cache *cache = server_exports(request->server);
+    snprintf(key, sizeof key, "%.63s/%s", request->parameter[0], etag);
+    if (export_cache_find(cache, key, &fd, n_bytes) || (fd = tool_temporary(request)) < 0)
+        return fd;
+    groom_status status = write_file(request, write, what, fd, n_bytes, &diag);
+    if (status == GROOM_OK) {
+        export_cache_keep(cache, key, fd, *n_bytes);
+        return fd;
+    }
+    close(fd);
+    respond_failure(request, status, &diag);
+    return -1;
 }
 
 /* Into a file first: a slow client then holds no thread, ranges work, and a failure is a problem and
@@ -245,28 +280,22 @@ static void export(struct request *request, write_strands write, const char *suf
 {
     struct grooms_export what = {.write = {.format = GROOM_FORMAT_HAIR, .frame = {.unit_m = 1}}};
     uint64_t count = 0, n_bytes = 0;
-    struct groom_diag diag = {0};
     char etag[80], name[80];
-    if (!query_revision(request, &what.revision) || !request_query_number(request, "count", 1, UINT32_MAX, &count) ||
-        !tool_query_format(request, true, &what.write.format) || !tool_query_frame(request, &what.write.frame) ||
-        !settle_revision(request, &what.revision))
+    if (!query_revision(request, &what.revision) ||
+        !request_query_number(request, "count", 1, UINT32_MAX, &count) ||
+        !tool_query_format(request, true, &what.write.format) ||
+        !tool_query_frame(request, &what.write.frame) || !settle_revision(request, &what.revision))
         return;
     what.count = (uint32_t)count;
-    snprintf(etag, sizeof etag, "%u%s-%s-%u-%.9g-%s", what.revision, suffix, groom_format_name(what.write.format), what.count,
-             what.write.frame.unit_m, what.write.frame.up == GROOM_UP_Z ? "z" : "y");
+    snprintf(etag, sizeof etag, "%u%s-%s-%u-%.9g-%s", what.revision, suffix,
+             groom_format_name(what.write.format), what.count, what.write.frame.unit_m,
+             what.write.frame.up == GROOM_UP_Z ? "z" : "y");
     snprintf(name, sizeof name, "%.31s-%u%s", request->parameter[0], what.revision, suffix);
     if (request_not_modified(request, etag))
         return;
-    int fd = tool_temporary(request);
-    if (fd < 0)
-        return;
-    groom_status status = write_file(request, write, &what, fd, &n_bytes, &diag);
-    if (status == GROOM_OK) {
+    int fd = make_export(request, write, &what, etag, &n_bytes);
+    if (fd >= 0)
         tool_respond_file(request, what.write.format, name, etag, fd, n_bytes);
-        return;
-    }
-    close(fd);
-    respond_failure(request, status, &diag);
 }
 
 void grooms_call_strands(struct request *request) { export(request, grooms_write_strands, ""); }
@@ -276,7 +305,8 @@ int grooms_check_guides(struct request *request)
 {
     groom_format format = GROOM_FORMAT_AUTO;
     struct groom_frame frame = {.unit_m = 1};
-    return tool_query_format(request, false, &format) && tool_query_frame(request, &frame) && grooms_check_edit(request);
+    return tool_query_format(request, false, &format) && tool_query_frame(request, &frame) &&
+           grooms_check_edit(request);
 }
 
 /* Guides from any format, by way of groom-worker: what the daemon reads is HAIR in metres. */
@@ -288,8 +318,16 @@ static bool convert_guides(struct request *request, int converted)
     if (!tool_query_format(request, false, &format) || !tool_query_frame(request, &frame))
         return false;
     snprintf(unit, sizeof unit, "%.17g", frame.unit_m);
-    const char *const arguments[] = {"convert", "--from-format", groom_format_name(format), "--from-unit", unit,
-                                     "--from-up", frame.up == GROOM_UP_Z ? "z" : "y", "--to-format", "hair", NULL};
+    const char *const arguments[] = {"convert",
+                                     "--from-format",
+                                     groom_format_name(format),
+                                     "--from-unit",
+                                     unit,
+                                     "--from-up",
+                                     frame.up == GROOM_UP_Z ? "z" : "y",
+                                     "--to-format",
+                                     "hair",
+                                     NULL};
     return tool_run(request, arguments, request->body_fd, converted, NULL, NULL);
 }
 
@@ -298,15 +336,16 @@ static void set_guides(struct request *request, int converted, uint32_t expected
     uint32_t number = 0;
     struct groom_strands *guides = NULL;
     struct groom_diag diag = {0};
-    struct groom_source source = groom_source_from_fd(converted);
     const struct groom_read_options options = {.format = GROOM_FORMAT_HAIR};
     if (lseek(converted, 0, SEEK_SET) < 0) {
         respond_failure(request, GROOM_EIO, NULL);
         return;
     }
+    struct groom_source source = groom_source_from_fd(converted); /* from where it stands */
     groom_status status = groom_strands_read(&source, &options, NULL, &guides, NULL, &diag);
     if (status == GROOM_OK)
-        status = grooms_set_guides(request->service->grooms, request->parameter[0], expected, guides, &number, &diag);
+        status = grooms_set_guides(request->service->grooms, request->parameter[0], expected, guides, &number,
+                                   &diag);
     groom_strands_destroy(guides);
     respond_edit(request, status, number, &diag);
 }
@@ -337,7 +376,8 @@ void grooms_call_preview(struct request *request)
     size_t n_bytes;
     struct groom_diag diag = {0};
     const char *text = request_query(request, "view");
-    if (!query_revision(request, &revision) || !request_query_number(request, "size", GROOM_RENDER_MIN_SIZE, GROOM_RENDER_MAX_SIZE, &size))
+    if (!query_revision(request, &revision) ||
+        !request_query_number(request, "size", GROOM_RENDER_MIN_SIZE, GROOM_RENDER_MAX_SIZE, &size))
         return;
     if (text && groom_view_parse(text, &view, &diag) != GROOM_OK) {
         respond_bad_query(request, "view", "%s", diag.detail);
@@ -348,7 +388,8 @@ void grooms_call_preview(struct request *request)
     snprintf(etag, sizeof etag, "%u-%s-%u", revision, groom_view_name(view), (unsigned)size);
     if (request_not_modified(request, etag))
         return;
-    groom_status status = grooms_preview(request->service->grooms, request->parameter[0], revision, view, (uint32_t)size, &png, &n_bytes, &diag);
+    groom_status status = grooms_preview(request->service->grooms, request->parameter[0], revision, view,
+                                         (uint32_t)size, &png, &n_bytes, &diag);
     if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
         return;

@@ -22,18 +22,23 @@ static bool only_known(struct request *request, const cJSON *body)
 {
     const cJSON *member;
     char pointer[96];
-    cJSON_ArrayForEach(member, body) {
+    cJSON_ArrayForEach(member, body)
+    {
         if (router_knows("kind strands head options priority", member->string))
             continue;
         snprintf(pointer, sizeof pointer, "/%.80s", member->string);
-        respond_bad_field(request, 400, pointer, "\"%.60s\" is not a member of a job; it takes kind, strands, head, options and priority", member->string);
+        respond_bad_field(
+            request, 400, pointer,
+            "\"%.60s\" is not a member of a job; it takes kind, strands, head, options and priority",
+            member->string);
         return false;
     }
     return true;
 }
 
 /* Copies body's id of an upload into inputs, where that upload is there. */
-static bool take_input(struct request *request, const cJSON *body, cJSON *inputs, const char *key, enum store_asset_kind kind, bool needed)
+static bool take_input(struct request *request, const cJSON *body, cJSON *inputs, const char *key,
+                       enum store_asset_kind kind, bool needed)
 {
     struct store_asset asset = {0};
     struct groom_diag diag = {0};
@@ -78,7 +83,8 @@ static bool take_options(struct request *request, const cJSON *body, struct subm
     struct groom_diag diag = {0};
     const cJSON *given = cJSON_GetObjectItemCaseSensitive(body, "options");
     char *text = given && !cJSON_IsNull(given) ? cJSON_PrintUnformatted(given) : strdup("{}");
-    groom_status status = options && text ? groom_fit_options_parse(text, strlen(text), options, &diag) : GROOM_ENOMEM;
+    groom_status status =
+        options && text ? groom_fit_options_parse(text, strlen(text), options, &diag) : GROOM_ENOMEM;
     if (status == GROOM_OK)
         status = groom_fit_options_print(options, &submission->options, &diag);
     free(options);
@@ -133,11 +139,15 @@ static void submit(struct request *request, const struct submission *submission)
     bool created;
     const char *key = request_header(request, "Idempotency-Key");
     if (key && (!key[0] || strlen(key) > 255)) {
-        respond_refusal(request, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL), "an Idempotency-Key has 1 to 255 characters");
+        respond_refusal(request, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL),
+                        "an Idempotency-Key has 1 to 255 characters");
         return;
     }
-    const struct jobs_request wanted = {.kind = "fit", .inputs = submission->inputs, .options = submission->options,
-                                        .priority = submission->priority, .idempotency_key = key};
+    const struct jobs_request wanted = {.kind = "fit",
+                                        .inputs = submission->inputs,
+                                        .options = submission->options,
+                                        .priority = submission->priority,
+                                        .idempotency_key = key};
     groom_status status = jobs_submit(request->service->jobs, &wanted, &job, &created, &diag);
     if (status == GROOM_ECONFLICT) {
         respond_refusal(request, 422, "idempotency-key-reused", "the key stands for another request",
@@ -239,7 +249,8 @@ static void park(struct request *request, uint32_t wait_s)
     groom_status status = GROOM_ENOMEM;
     if (waiting) {
         *waiting = (struct waiting){request, follow_now_ms() + (int64_t)wait_s * 1000};
-        status = follower_create(server_followers(request->server), request->parameter[0], act, free, waiting, &follower);
+        status = follower_create(server_followers(request->server), request->parameter[0], act, free, waiting,
+                                 &follower);
     }
     if (status == GROOM_OK)
         return;
@@ -273,7 +284,8 @@ void jobs_call_delete(struct request *request)
 
 /* --- events ---------------------------------------------------------------------------------- */
 
-/* Where a client that comes again was: the header that browsers send, or ?after= where headers cannot be set. */
+/* Where a client that comes again was: the header that browsers send, or ?after= where headers cannot be set.
+ */
 static bool last_event(struct request *request, int64_t *after)
 {
     uint64_t number = 0;
@@ -284,7 +296,8 @@ static bool last_event(struct request *request, int64_t *after)
         char *end;
         number = strtoull(header, &end, 10);
         if (header[strspn(header, "0123456789")] || number > INT64_MAX) {
-            respond_refusal(request, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL), "Last-Event-ID is \"%.40s\"; it must be the id of an event", header);
+            respond_refusal(request, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL),
+                            "Last-Event-ID is \"%.40s\"; it must be the id of an event", header);
             return false;
         }
     }

@@ -9,8 +9,8 @@ static const double bounds[] = {0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.
 #define N_BOUNDS (sizeof bounds / sizeof bounds[0])
 
 struct row {
-    atomic_ullong by_class[6];           /* of 1xx..5xx */
-    atomic_ullong bucket[N_BOUNDS + 1];  /* not cumulative here */
+    atomic_ullong by_class[6];          /* of 1xx..5xx */
+    atomic_ullong bucket[N_BOUNDS + 1]; /* not cumulative here */
     atomic_ullong microseconds;
 };
 
@@ -49,7 +49,7 @@ void metrics_stream(struct metrics *metrics, int change) { atomic_fetch_add(&met
 
 static void print_counts(FILE *out, struct row *row, const char *name)
 {
-    for (int class = 1; class < 6; class++) {
+    for (int class = 1; class < 6; class ++) {
         unsigned long long n = atomic_load(&row->by_class[class]);
         if (n)
             fprintf(out, "groomd_http_requests_total{route=\"%s\",status=\"%dxx\"} %llu\n", name, class, n);
@@ -65,13 +65,14 @@ static void print_latency(FILE *out, struct row *row, const char *name)
     }
     n += atomic_load(&row->bucket[N_BOUNDS]);
     fprintf(out, "groomd_http_request_seconds_bucket{route=\"%s\",le=\"+Inf\"} %llu\n", name, n);
-    fprintf(out, "groomd_http_request_seconds_sum{route=\"%s\"} %.6f\n", name, (double)atomic_load(&row->microseconds) * 1e-6);
+    fprintf(out, "groomd_http_request_seconds_sum{route=\"%s\"} %.6f\n", name,
+            (double)atomic_load(&row->microseconds) * 1e-6);
     fprintf(out, "groomd_http_request_seconds_count{route=\"%s\"} %llu\n", name, n);
 }
 
 static int was_used(struct row *row)
 {
-    for (int class = 1; class < 6; class++)
+    for (int class = 1; class < 6; class ++)
         if (atomic_load(&row->by_class[class]))
             return 1;
     return 0;
@@ -103,14 +104,18 @@ char *metrics_print(struct metrics *metrics, const char *(*name_of)(const void *
     head(out, "groomd_http_requests_total", "counter", "Requests answered, by route and status class.");
     for (size_t i = 0; i < metrics->n_rows; i++)
         print_counts(out, &metrics->rows[i], name_of(user, i, name, sizeof name));
-    head(out, "groomd_http_request_seconds", "histogram", "Time from the head of a request to the end of its answer.");
+    head(out, "groomd_http_request_seconds", "histogram",
+         "Time from the head of a request to the end of its answer.");
     for (size_t i = 0; i < metrics->n_rows; i++)
         if (was_used(&metrics->rows[i]))
             print_latency(out, &metrics->rows[i], name_of(user, i, name, sizeof name));
     const struct metrics_line own[] = {
-        {"groomd_http_received_bytes_total", "", "Bytes of request bodies.", "counter", (double)atomic_load(&metrics->received)},
-        {"groomd_http_sent_bytes_total", "", "Bytes of response bodies.", "counter", (double)atomic_load(&metrics->sent)},
-        {"groomd_http_event_streams", "", "Open event streams.", "gauge", (double)atomic_load(&metrics->streams)},
+        {"groomd_http_received_bytes_total", "", "Bytes of request bodies.", "counter",
+         (double)atomic_load(&metrics->received)},
+        {"groomd_http_sent_bytes_total", "", "Bytes of response bodies.", "counter",
+         (double)atomic_load(&metrics->sent)},
+        {"groomd_http_event_streams", "", "Open event streams.", "gauge",
+         (double)atomic_load(&metrics->streams)},
     };
     print_lines(out, own, sizeof own / sizeof own[0]);
     print_lines(out, lines, n_lines);

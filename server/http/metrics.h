@@ -23,7 +23,8 @@ struct metrics_line {
 };
 
 /* name_of(user, i) labels route i ("GET /v1/jobs/{id}"). *text is malloc'ed; NULL: out of memory. */
-char *metrics_print(struct metrics *metrics, const char *(*name_of)(const void *user, size_t route, char *text, size_t capacity),
+char *metrics_print(struct metrics *metrics,
+                    const char *(*name_of)(const void *user, size_t route, char *text, size_t capacity),
                     const void *user, const struct metrics_line *lines, size_t n_lines);
 
 #endif

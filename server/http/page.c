@@ -17,12 +17,23 @@ static void put_escaped(FILE *out, const char *text)
 {
     for (; *text; text++)
         switch (*text) {
-        case '<': fputs("&lt;", out); break;
-        case '>': fputs("&gt;", out); break;
-        case '&': fputs("&amp;", out); break;
-        case '"': fputs("&quot;", out); break;
-        case '\'': fputs("&#39;", out); break;
-        default: fputc(*text, out);
+        case '<':
+            fputs("&lt;", out);
+            break;
+        case '>':
+            fputs("&gt;", out);
+            break;
+        case '&':
+            fputs("&amp;", out);
+            break;
+        case '"':
+            fputs("&quot;", out);
+            break;
+        case '\'':
+            fputs("&#39;", out);
+            break;
+        default:
+            fputc(*text, out);
         }
 }
 
@@ -30,13 +41,18 @@ static void put_groom(FILE *out, const struct store_groom *groom)
 {
     char changed[32];
     store_time_text(groom->changed_ms, changed);
-    fprintf(out, "<figure><a href=\"/v1/grooms/%s/preview.png?size=1024\"><img loading=\"lazy\" width=\"192\" height=\"192\" alt=\"\" "
-                 "src=\"/v1/grooms/%s/preview.png?size=192&amp;revision=%u\"></a><figcaption><b>", groom->id, groom->id, groom->latest);
+    fprintf(out,
+            "<figure><a href=\"/v1/grooms/%s/preview.png?size=1024\"><img loading=\"lazy\" width=\"192\" "
+            "height=\"192\" alt=\"\" "
+            "src=\"/v1/grooms/%s/preview.png?size=192&amp;revision=%u\"></a><figcaption><b>",
+            groom->id, groom->id, groom->latest);
     put_escaped(out, groom->name && groom->name[0] ? groom->name : groom->id);
-    fprintf(out, "</b><br><code>%s</code><br>revision %u, <time>%s</time><br>", groom->id, groom->latest, changed);
+    fprintf(out, "</b><br><code>%s</code><br>revision %u, <time>%s</time><br>", groom->id, groom->latest,
+            changed);
     static const char *const formats[] = {"hair", "usda", "ply", "obj"};
     for (size_t i = 0; i < sizeof formats / sizeof formats[0]; i++)
-        fprintf(out, "<a href=\"/v1/grooms/%s/strands?format=%s\">%s</a> ", groom->id, formats[i], formats[i]);
+        fprintf(out, "<a href=\"/v1/grooms/%s/strands?format=%s\">%s</a> ", groom->id, formats[i],
+                formats[i]);
     fprintf(out, "<a href=\"/v1/grooms/%s?arrays=false\">document</a></figcaption></figure>\n", groom->id);
 }
 
@@ -70,9 +86,11 @@ static void put_job(FILE *out, const struct store_job *job)
     char created[32];
     const char *state = store_job_state_name(job->state);
     store_time_text(job->created_ms, created);
-    fprintf(out, "<tr class=\"%s\"><td><a href=\"/v1/jobs/%s\"><code>%s</code></a></td><td>%s</td><td>", state, job->id, job->id, state);
+    fprintf(out, "<tr class=\"%s\"><td><a href=\"/v1/jobs/%s\"><code>%s</code></a></td><td>%s</td><td>",
+            state, job->id, job->id, state);
     put_escaped(out, job->stage ? job->stage : "");
-    fprintf(out, "</td><td><progress max=\"1\" value=\"%.3f\"></progress></td><td><time>%s</time></td><td>", job->progress, created);
+    fprintf(out, "</td><td><progress max=\"1\" value=\"%.3f\"></progress></td><td><time>%s</time></td><td>",
+            job->progress, created);
     put_result(out, job);
     fputs("</td></tr>\n", out);
 }
@@ -80,7 +98,9 @@ static void put_job(FILE *out, const struct store_job *job)
 static void put_jobs(FILE *out, struct jobs *jobs)
 {
     struct store_job_list list = {0};
-    fputs("<h2>Jobs</h2>\n<table><tr><th>job</th><th>state</th><th>stage</th><th>progress</th><th>created</th><th>result</th></tr>\n", out);
+    fputs("<h2>Jobs</h2>\n<table><tr><th>job</th><th>state</th><th>stage</th><th>progress</th><th>created</"
+          "th><th>result</th></tr>\n",
+          out);
     if (jobs_list(jobs, NULL, (struct store_page){.limit = N_SHOWN}, &list, NULL) != GROOM_OK)
         fputs("<tr><td colspan=\"6\">The database does not answer.</td></tr>\n", out);
     for (size_t i = 0; i < list.n; i++)
@@ -98,10 +118,14 @@ void page_index(struct request *request)
         respond_failure(request, GROOM_ENOMEM, NULL);
         return;
     }
-    fputs("<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta http-equiv=\"refresh\" content=\"5\">"
+    fputs("<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta http-equiv=\"refresh\" "
+          "content=\"5\">"
           "<meta name=\"viewport\" content=\"width=device-width\"><title>groomd</title>"
-          "<link rel=\"stylesheet\" href=\"/status.css\"></head>\n<body><h1>groomd</h1>\n<p>Dense hair strands in, procedural grooms out. "
-          "<a href=\"/openapi.json\">API</a> <a href=\"/v1/options\">options</a> <a href=\"/metrics\">metrics</a></p>\n", out);
+          "<link rel=\"stylesheet\" href=\"/status.css\"></head>\n<body><h1>groomd</h1>\n<p>Dense hair "
+          "strands in, procedural grooms out. "
+          "<a href=\"/openapi.json\">API</a> <a href=\"/v1/options\">options</a> <a "
+          "href=\"/metrics\">metrics</a></p>\n",
+          out);
     put_grooms(out, request->service->store);
     put_jobs(out, request->service->jobs);
     fputs("</body></html>\n", out);
@@ -111,7 +135,9 @@ void page_index(struct request *request)
         return;
     }
     respond_bytes(request, 200, "text/html; charset=utf-8", text, size);
-    respond_header(request, "Content-Security-Policy", "default-src 'none'; img-src 'self'; style-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+    respond_header(request, "Content-Security-Policy",
+                   "default-src 'none'; img-src 'self'; style-src 'self'; base-uri 'none'; form-action "
+                   "'none'; frame-ancestors 'none'");
     respond_header(request, "Referrer-Policy", "no-referrer");
 }
 

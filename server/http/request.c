@@ -46,8 +46,8 @@ bool request_query_number(struct request *request, const char *name, uint64_t mi
     if (!text)
         return true;
     if (!parse_number(text, &number) || number < minimum || number > maximum) {
-        respond_bad_query(request, name, "%s is \"%.40s\"; it must be a whole number from %llu to %llu", name, text,
-                          (unsigned long long)minimum, (unsigned long long)maximum);
+        respond_bad_query(request, name, "%s is \"%.40s\"; it must be a whole number from %llu to %llu", name,
+                          text, (unsigned long long)minimum, (unsigned long long)maximum);
         return false;
     }
     *value = number;
@@ -73,7 +73,8 @@ cJSON *request_json(struct request *request)
     struct problem problem;
     cJSON *json = json_text_parse(request->body ? request->body : "", request->n_body, &error);
     if (!json) {
-        problem_set(&problem, 400, "invalid-json", "the body is not JSON that can be taken", "%s", error.detail);
+        problem_set(&problem, 400, "invalid-json", "the body is not JSON that can be taken", "%s",
+                    error.detail);
         problem.byte_offset = error.byte_offset;
         respond_problem(request, &problem);
     } else if (!cJSON_IsObject(json)) {
@@ -112,7 +113,8 @@ bool request_if_match(struct request *request, uint32_t *revision)
     }
     if (!quoted || !parse_number(text, &number) || number == 0 || number > UINT32_MAX) {
         respond_refusal(request, 412, "precondition-failed", "it was changed meanwhile",
-                        "If-Match is %.60s; it must be the ETag of a revision, like \"3\" with its quotes", value);
+                        "If-Match is %.60s; it must be the ETag of a revision, like \"3\" with its quotes",
+                        value);
         return false;
     }
     *revision = (uint32_t)number;
@@ -168,7 +170,8 @@ void response_finish(struct response *response)
     *response = (struct response){.fd = -1};
 }
 
-static struct response *begin(struct request *request, enum response_kind kind, int status, const char *content_type)
+static struct response *begin(struct request *request, enum response_kind kind, int status,
+                              const char *content_type)
 {
     struct response *response = &request->response;
     response_finish(response);
@@ -183,7 +186,8 @@ void respond_bytes(struct request *request, int status, const char *content_type
     response->n_bytes = n_bytes;
 }
 
-void respond_static(struct request *request, int status, const char *content_type, const char *bytes, size_t n_bytes)
+void respond_static(struct request *request, int status, const char *content_type, const char *bytes,
+                    size_t n_bytes)
 {
     struct response *response = begin(request, RESPONSE_BYTES, status, content_type);
     response->bytes = (char *)(size_t)bytes; /* only read: is_static */
@@ -205,7 +209,8 @@ void respond_events(struct request *request, struct event_feed *feed)
     begin(request, RESPONSE_EVENTS, 200, "text/event-stream")->feed = feed;
 }
 
-static const char no_memory[] = "{\"type\":\"/problems/out-of-memory\",\"title\":\"memory ran out\",\"status\":507}";
+static const char no_memory[] =
+    "{\"type\":\"/problems/out-of-memory\",\"title\":\"memory ran out\",\"status\":507}";
 
 void respond_json(struct request *request, int status, cJSON *json)
 {
@@ -235,8 +240,8 @@ void respond_failure(struct request *request, groom_status status, const struct 
 {
     struct problem problem;
     bool has_detail = diag && diag->status == status;
-    problem_set(&problem, groom_status_http(status), groom_status_name(status), groom_status_message(status), "%s",
-                has_detail ? diag->detail : "");
+    problem_set(&problem, groom_status_http(status), groom_status_name(status), groom_status_message(status),
+                "%s", has_detail ? diag->detail : "");
     if (has_detail) {
         snprintf(problem.pointer, sizeof problem.pointer, "%s", diag->pointer);
         problem.byte_offset = diag->byte_offset;
@@ -244,7 +249,8 @@ void respond_failure(struct request *request, groom_status status, const struct 
     respond_problem(request, &problem);
 }
 
-void respond_refusal(struct request *request, int status, const char *name, const char *title, const char *format, ...)
+void respond_refusal(struct request *request, int status, const char *name, const char *title,
+                     const char *format, ...)
 {
     char detail[512];
     struct problem problem;
@@ -263,7 +269,8 @@ void respond_bad_query(struct request *request, const char *parameter, const cha
     va_start(arguments, format);
     vsnprintf(detail, sizeof detail, format, arguments);
     va_end(arguments);
-    problem_set(&problem, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL), "%s", detail);
+    problem_set(&problem, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL), "%s",
+                detail);
     snprintf(problem.parameter, sizeof problem.parameter, "%s", parameter);
     respond_problem(request, &problem);
 }
@@ -276,7 +283,8 @@ void respond_bad_field(struct request *request, int status, const char *pointer,
     va_start(arguments, format);
     vsnprintf(detail, sizeof detail, format, arguments);
     va_end(arguments);
-    problem_set(&problem, status, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL), "%s", detail);
+    problem_set(&problem, status, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL), "%s",
+                detail);
     snprintf(problem.pointer, sizeof problem.pointer, "%s", pointer);
     respond_problem(request, &problem);
 }
@@ -288,7 +296,8 @@ void respond_header(struct request *request, const char *name, const char *forma
     if (response->n_headers == RESPONSE_MAX_HEADERS)
         return;
     va_start(arguments, format);
-    vsnprintf(response->headers[response->n_headers].value, sizeof response->headers[0].value, format, arguments);
+    vsnprintf(response->headers[response->n_headers].value, sizeof response->headers[0].value, format,
+              arguments);
     va_end(arguments);
     response->headers[response->n_headers++].name = name;
 }

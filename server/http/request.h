@@ -35,43 +35,46 @@ struct response {
     char *bytes;              /* malloc'ed, or static where is_static */
     size_t n_bytes;
     bool is_static;
-    int fd;                   /* of RESPONSE_FILE */
+    int fd; /* of RESPONSE_FILE */
     uint64_t n_file;
-    struct event_feed *feed;  /* of RESPONSE_EVENTS */
-    char etag[80];            /* with its quotes; "" for none */
+    struct event_feed *feed; /* of RESPONSE_EVENTS */
+    char etag[80];           /* with its quotes; "" for none */
     size_t n_headers;
-    struct { const char *name; char value[232]; } headers[RESPONSE_MAX_HEADERS];
+    struct {
+        const char *name;
+        char value[232];
+    } headers[RESPONSE_MAX_HEADERS];
 };
 
 struct request {
-    struct task task;                /* first: a lane's task is its request */
+    struct task task; /* first: a lane's task is its request */
     const struct service *service;
-    char id[24];                     /* in the log, in X-Request-Id and in problems */
+    char id[24]; /* in the log, in X-Request-Id and in problems */
     char method[16];
-    char path[160];                  /* as it was sent, for logs and problems; may be cut */
+    char path[160]; /* as it was sent, for logs and problems; may be cut */
     struct uri uri;
-    const struct route *route;       /* NULL where none was found */
+    const struct route *route; /* NULL where none was found */
     const char *parameter[ROUTE_MAX_PARAMETERS];
 
     /* the body, as the route's body_mode says */
-    char *body;                      /* BODY_MEMORY: zero-terminated beyond n_body */
+    char *body; /* BODY_MEMORY: zero-terminated beyond n_body */
     size_t n_body;
-    int body_fd;                     /* BODY_FILE: -1 for none; stands at the end of what was written */
-    struct blobs_writer *blob;       /* BODY_BLOB: the handler commits it (and sets it to NULL) */
+    int body_fd;               /* BODY_FILE: -1 for none; stands at the end of what was written */
+    struct blobs_writer *blob; /* BODY_BLOB: the handler commits it (and sets it to NULL) */
     uint64_t n_received;
 
-    struct store_attempt_ref attempt;/* ROUTE_WORK: who is asking */
+    struct store_attempt_ref attempt; /* ROUTE_WORK: who is asking */
     struct response response;
 
     /* the server's */
     struct server *server;
     struct MHD_Connection *connection;
-    struct link *link;               /* of the connection */
+    struct link *link; /* of the connection */
     int phase;
-    bool discard;                    /* the answer is known: the rest of the body is read and dropped */
+    bool discard; /* the answer is known: the rest of the body is read and dropped */
     bool http_1_1;
-    bool close;                      /* after the answer */
-    uint64_t n_expected;             /* Content-Length; UINT64_MAX where chunked */
+    bool close;          /* after the answer */
+    uint64_t n_expected; /* Content-Length; UINT64_MAX where chunked */
     size_t body_capacity;
     int64_t started_us;
     uint64_t n_sent;
@@ -105,8 +108,10 @@ uint32_t request_wait_s(const struct request *request);
 /* Taken over: json, also where NULL (out of memory is then the answer). */
 void respond_json(struct request *request, int status, struct cJSON *json);
 /* bytes are malloc'ed and taken over; content_type is static. */
-void respond_bytes(struct request *request, int status, const char *content_type, char *bytes, size_t n_bytes);
-void respond_static(struct request *request, int status, const char *content_type, const char *bytes, size_t n_bytes);
+void respond_bytes(struct request *request, int status, const char *content_type, char *bytes,
+                   size_t n_bytes);
+void respond_static(struct request *request, int status, const char *content_type, const char *bytes,
+                    size_t n_bytes);
 void respond_empty(struct request *request, int status);
 /* fd is taken over; all n_bytes of it from its beginning. Ranges are honoured. */
 void respond_file(struct request *request, const char *content_type, int fd, uint64_t n_bytes);
@@ -117,8 +122,8 @@ void respond_problem(struct request *request, const struct problem *problem);
 /* What a call of the library or the store answered. */
 void respond_failure(struct request *request, groom_status status, const struct groom_diag *diag);
 /* A problem of HTTP itself: name and title are static. */
-void respond_refusal(struct request *request, int status, const char *name, const char *title, const char *format, ...)
-    __attribute__((format(printf, 5, 6)));
+void respond_refusal(struct request *request, int status, const char *name, const char *title,
+                     const char *format, ...) __attribute__((format(printf, 5, 6)));
 /* The query parameter `parameter` is refused. */
 void respond_bad_query(struct request *request, const char *parameter, const char *format, ...)
     __attribute__((format(printf, 3, 4)));

@@ -31,15 +31,15 @@ struct route {
     void (*handle)(struct request *request);
     enum body_mode body;
     enum lane_name lane;
-    const char *query;   /* query parameters that it knows, blanks between; any other is refused */
+    const char *query; /* query parameters that it knows, blanks between; any other is refused */
     int flags;
     /* NULL, or asked before the body is read: answers and returns false where the request cannot be
      * right. It must not wait. */
     int (*check)(struct request *request);
 };
 
-#define ROUTE_WORK  1 /* asks for the bearer token of an attempt */
-#define ROUTE_QUIET 2 /* logged at level debug: probes and progress */
+#define ROUTE_WORK    1 /* asks for the bearer token of an attempt */
+#define ROUTE_QUIET   2 /* logged at level debug: probes and progress */
 #define ROUTE_RESUMES 4 /* its handler calls request_resume when it has the answer */
 
 enum router_outcome { ROUTER_FOUND, ROUTER_NO_PATH, ROUTER_NO_METHOD };

@@ -1,6 +1,7 @@
 /* Every call that groomd answers. proto/openapi.yaml describes each; a test holds the two together. */
 #include "server/http/handlers.h"
 
+/* clang-format off */
 const struct route http_routes[] = {
     {"GET", "/", page_index, BODY_NONE, LANE_FAST, "", 0, NULL},
     {"GET", "/status.css", page_style, BODY_NONE, LANE_INLINE, "", 0, NULL},
@@ -44,4 +45,5 @@ const struct route http_routes[] = {
     {"POST", "/v1/work/result", work_call_result, BODY_FILE, LANE_SLOW, "", ROUTE_WORK, NULL},
     {"POST", "/v1/work/failed", work_call_failed, BODY_MEMORY, LANE_FAST, "", ROUTE_WORK, NULL},
 };
+/* clang-format on */
 const size_t http_n_routes = sizeof http_routes / sizeof http_routes[0];

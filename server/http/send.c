@@ -53,7 +53,8 @@ static struct MHD_Response *from_file(struct request *request)
 {
     struct response *response = &request->response;
     const char *if_range = request_header(request, "If-Range"), *wanted = request_header(request, "Range");
-    struct range range = parse_range(if_range && strcmp(if_range, response->etag) ? NULL : wanted, response->n_file);
+    struct range range =
+        parse_range(if_range && strcmp(if_range, response->etag) ? NULL : wanted, response->n_file);
     uint64_t size = response->n_file;
     if (range.kind == OUTSIDE) {
         respond_refusal(request, 416, "range-not-satisfiable", "the range is outside the file",
@@ -69,7 +70,7 @@ static struct MHD_Response *from_file(struct request *request)
     respond_header(request, "Accept-Ranges", "bytes");
     request->n_sent = range.n;
     if (range.n == 0)
-        return MHD_create_response_from_buffer(0, (void *)(size_t)"", MHD_RESPMEM_PERSISTENT);
+        return MHD_create_response_from_buffer(0, (void *)(size_t) "", MHD_RESPMEM_PERSISTENT);
     struct MHD_Response *sent = MHD_create_response_from_fd_at_offset64(range.n, response->fd, range.first);
     if (sent)
         response->fd = -1; /* libmicrohttpd closes it */
@@ -91,11 +92,13 @@ static struct MHD_Response *create(struct request *request)
 {
     struct event_feed *feed = request->response.feed;
     switch (request->response.kind) {
-    case RESPONSE_FILE: return from_file(request);
+    case RESPONSE_FILE:
+        return from_file(request);
     case RESPONSE_EVENTS:
         request->response.feed = NULL;
         return events_create_response(feed);
-    case RESPONSE_BYTES: return from_bytes(request);
+    case RESPONSE_BYTES:
+        return from_bytes(request);
     default:
         respond_failure(request, GROOM_EINTERNAL, NULL);
         return from_bytes(request);
@@ -126,7 +129,8 @@ int server_send(struct request *request)
     add_headers(request, sent);
     if (request_is_head(request) || request->response.status == 304)
         request->n_sent = 0;
-    enum MHD_Result result = MHD_queue_response(request->connection, (unsigned)request->response.status, sent);
+    enum MHD_Result result =
+        MHD_queue_response(request->connection, (unsigned)request->response.status, sent);
     MHD_destroy_response(sent);
     return result;
 }

@@ -42,6 +42,7 @@ struct server {
     struct followers *followers;
     struct connections *connections;
     struct metrics *metrics;
+    struct export_cache *exports;
     pthread_t ticker;
     bool has_ticker;
     atomic_bool draining, closing, ending;
@@ -53,7 +54,11 @@ struct server {
 struct metrics *server_metrics(struct server *server) { return server->metrics; }
 struct followers *server_followers(struct server *server) { return server->followers; }
 uint64_t server_connections(struct server *server) { return connections_count(server->connections); }
-struct lane *server_lane(struct server *server, enum lane_name name) { return name == LANE_SLOW ? server->slow : server->fast; }
+struct export_cache *server_exports(struct server *server) { return server->exports; }
+struct lane *server_lane(struct server *server, enum lane_name name)
+{
+    return name == LANE_SLOW ? server->slow : server->fast;
+}
 bool server_is_draining(const struct server *server) { return atomic_load(&server->draining); }
 
 /* Count first, look after: server_stop sets `closing` first and reads the count after. */
@@ -146,8 +151,8 @@ static bool find_route(struct request *request)
         if (!strcmp(request->method, "OPTIONS"))
             respond_empty(request, 204);
         else
-            respond_refusal(request, 405, "method-not-allowed", "the resource has no such method", "%s takes %s",
-                            request->path, match.allow);
+            respond_refusal(request, 405, "method-not-allowed", "the resource has no such method",
+                            "%s takes %s", request->path, match.allow);
         respond_header(request, "Allow", "%s", match.allow);
         return false;
     default:
@@ -177,25 +182,31 @@ static bool is_json(const char *type)
     if (!type)
         return true;
     size_t n = strcspn(type, "; ");
-    return (n == 16 && !strncasecmp(type, "application/json", n)) || (n > 5 && !strncasecmp(type + n - 5, "+json", 5));
+    return (n == 16 && !strncasecmp(type, "application/json", n)) ||
+           (n > 5 && !strncasecmp(type + n - 5, "+json", 5));
 }
 
 static bool check_media(struct request *request)
 {
     static const char title[] = "the body is of a kind that this call does not take";
-    const char *type = request_header(request, "Content-Type"), *coding = request_header(request, "Content-Encoding");
+    const char *type = request_header(request, "Content-Type"),
+               *coding = request_header(request, "Content-Encoding");
     if (request->n_expected == 0)
         return true;
     if (coding && strcasecmp(coding, "identity")) {
-        respond_refusal(request, 415, "unsupported-media-type", title, "Content-Encoding %.40s is not taken; send the bytes as they are", coding);
+        respond_refusal(request, 415, "unsupported-media-type", title,
+                        "Content-Encoding %.40s is not taken; send the bytes as they are", coding);
         return false;
     }
     if (request->route->body == BODY_MEMORY && !is_json(type)) {
-        respond_refusal(request, 415, "unsupported-media-type", title, "Content-Type is %.60s; this call takes application/json", type);
+        respond_refusal(request, 415, "unsupported-media-type", title,
+                        "Content-Type is %.60s; this call takes application/json", type);
         return false;
     }
     if (type && !strncasecmp(type, "multipart/", 10)) {
-        respond_refusal(request, 415, "unsupported-media-type", title, "Content-Type is %.60s; send the bytes of the file themselves (curl --data-binary @FILE)", type);
+        respond_refusal(
+            request, 415, "unsupported-media-type", title,
+            "Content-Type is %.60s; send the bytes of the file themselves (curl --data-binary @FILE)", type);
         return false;
     }
     return true;
@@ -205,16 +216,20 @@ static uint64_t body_limit(const struct request *request)
 {
     const struct config *config = request->service->config;
     switch (request->route ? request->route->body : BODY_NONE) {
-    case BODY_NONE: return 0;
-    case BODY_MEMORY: return config->max_body;
-    default: return config->max_upload;
+    case BODY_NONE:
+        return 0;
+    case BODY_MEMORY:
+        return config->max_body;
+    default:
+        return config->max_upload;
     }
 }
 
 static void refuse_large(struct request *request)
 {
     respond_refusal(request, 413, groom_status_name(GROOM_ETOOBIG), groom_status_message(GROOM_ETOOBIG),
-                    "the body is larger than the limit of %llu bytes (%s)", (unsigned long long)body_limit(request),
+                    "the body is larger than the limit of %llu bytes (%s)",
+                    (unsigned long long)body_limit(request),
                     request->route->body == BODY_MEMORY ? "--max-body" : "--max-upload");
 }
 
@@ -224,7 +239,8 @@ static bool check_size(struct request *request)
     if (request->n_expected == 0)
         return true;
     if (request->route->body == BODY_NONE) {
-        respond_refusal(request, 400, "bad-request", bad_request, "%s %s takes no body", request->method, request->path);
+        respond_refusal(request, 400, "bad-request", bad_request, "%s %s takes no body", request->method,
+                        request->path);
         return false;
     }
     bool known = request->n_expected != UINT64_MAX;
@@ -233,7 +249,8 @@ static bool check_size(struct request *request)
         return false;
     }
     if (request->route->body != BODY_MEMORY && !statvfs(request->service->temporary_folder, &disk) &&
-        (uint64_t)disk.f_bavail * disk.f_frsize < request->service->config->min_free + (known ? request->n_expected : 0)) {
+        (uint64_t)disk.f_bavail * disk.f_frsize <
+            request->service->config->min_free + (known ? request->n_expected : 0)) {
         respond_failure(request, GROOM_ENOSPC, NULL);
         return false;
     }
@@ -250,8 +267,10 @@ static bool open_body(struct request *request)
     if (request->route->body == BODY_BLOB)
         status = blobs_begin(request->service->blobs, known, &request->blob, &diag);
     if (request->route->body == BODY_FILE &&
-        (request->body_fd = open(request->service->temporary_folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600)) < 0)
-        status = groom_fail(&diag, errno == ENOSPC ? GROOM_ENOSPC : GROOM_EIO, "no temporary file: %s", strerror(errno));
+        (request->body_fd = open(request->service->temporary_folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600)) <
+            0)
+        status = groom_fail(&diag, errno == ENOSPC ? GROOM_ENOSPC : GROOM_EIO, "no temporary file: %s",
+                            strerror(errno));
     if (status == GROOM_OK)
         return true;
     respond_failure(request, status, &diag);
@@ -303,9 +322,15 @@ static void take_bytes(struct request *request, const char *bytes, size_t n)
         return;
     }
     switch (request->route->body) {
-    case BODY_MEMORY: status = keep_in_memory(request, bytes, n); break;
-    case BODY_FILE: status = keep_in_file(request->body_fd, bytes, n); break;
-    default: status = blobs_write(request->blob, bytes, n, &diag); break;
+    case BODY_MEMORY:
+        status = keep_in_memory(request, bytes, n);
+        break;
+    case BODY_FILE:
+        status = keep_in_file(request->body_fd, bytes, n);
+        break;
+    default:
+        status = blobs_write(request->blob, bytes, n, &diag);
+        break;
     }
     if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
@@ -340,7 +365,8 @@ static void run_check(struct task *task)
     const char *token = header && !strncasecmp(header, "Bearer ", 7) ? header + 7 : "";
     groom_status status = work_authenticate(request->service->jobs, token, &request->attempt, &diag);
     if (status == GROOM_ENOTFOUND) {
-        respond_refusal(request, 401, "unauthorized", "the request needs a valid token", "this call takes the bearer token of an attempt");
+        respond_refusal(request, 401, "unauthorized", "the request needs a valid token",
+                        "this call takes the bearer token of an attempt");
         respond_header(request, "WWW-Authenticate", "Bearer realm=\"groomd work\"");
     } else if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
@@ -381,7 +407,8 @@ static enum MHD_Result work(struct request *request)
     link_busy(request->link);
     if (!is_answered(request) && route->lane == LANE_INLINE)
         route->handle(request);
-    if (!is_answered(request) && start(request, server_lane(request->server, route->lane), run_handler, false))
+    if (!is_answered(request) &&
+        start(request, server_lane(request->server, route->lane), run_handler, false))
         return MHD_YES;
     request->phase = PHASE_ANSWERED;
     return (enum MHD_Result)server_send(request);
@@ -408,7 +435,8 @@ static enum MHD_Result refuse(struct request *request)
 static bool check_head(struct request *request)
 {
     return !is_answered(request) && read_length(request) && find_route(request) && check_query(request) &&
-           check_media(request) && check_size(request) && (!request->route->check || request->route->check(request));
+           check_media(request) && check_size(request) &&
+           (!request->route->check || request->route->check(request));
 }
 
 static enum MHD_Result on_checked(struct request *request)
@@ -446,13 +474,15 @@ static enum MHD_Result on_body(struct request *request, const char *bytes, size_
     take_bytes(request, bytes, *n_bytes);
     *n_bytes = 0;
     /* nobody is to pour into the void without end */
-    if (request->discard && request->n_received > body_limit(request) + DISCARD_MAX && request->n_received > DISCARD_MAX)
+    if (request->discard && request->n_received > body_limit(request) + DISCARD_MAX &&
+        request->n_received > DISCARD_MAX)
         return MHD_NO;
     return MHD_YES;
 }
 
-static enum MHD_Result on_access(void *user, struct MHD_Connection *connection, const char *url, const char *method,
-                                 const char *version, const char *bytes, size_t *n_bytes, void **state)
+static enum MHD_Result on_access(void *user, struct MHD_Connection *connection, const char *url,
+                                 const char *method, const char *version, const char *bytes, size_t *n_bytes,
+                                 void **state)
 {
     struct request *request = *state;
     (void)user, (void)url;
@@ -464,8 +494,10 @@ static enum MHD_Result on_access(void *user, struct MHD_Connection *connection, 
         snprintf(request->method, sizeof request->method, "%s", method);
         request->http_1_1 = !strcmp(version, MHD_HTTP_VERSION_1_1);
         return on_head(request);
-    case PHASE_CHECKED: return on_checked(request);
-    case PHASE_BODY: return on_body(request, bytes, n_bytes);
+    case PHASE_CHECKED:
+        return on_checked(request);
+    case PHASE_BODY:
+        return on_body(request, bytes, n_bytes);
     case PHASE_WORKING:
         request->phase = PHASE_ANSWERED;
         return (enum MHD_Result)server_send(request);
@@ -485,7 +517,8 @@ static void *on_target(void *user, const char *target, struct MHD_Connection *co
     struct request *request = calloc(1, sizeof *request);
     if (!request)
         return NULL;
-    const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
+    const union MHD_ConnectionInfo *info =
+        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
     request->server = server;
     request->service = server->service;
     request->connection = connection;
@@ -494,13 +527,15 @@ static void *on_target(void *user, const char *target, struct MHD_Connection *co
     request->response.fd = -1;
     request->started_us = now_us();
     unsigned long long number = atomic_fetch_add(&server->next_id, 1);
-    snprintf(request->id, sizeof request->id, "%08llx%06llx", (unsigned long long)server->id_base & 0xffffffff, number & 0xffffffffff);
+    snprintf(request->id, sizeof request->id, "%08llx%06llx",
+             (unsigned long long)server->id_base & 0xffffffff, number & 0xffffffffff);
     snprintf(request->path, sizeof request->path, "%s", target);
     request->path[strcspn(request->path, "?")] = 0;
     atomic_fetch_add(&server->n_requests, 1);
     const char *wrong = uri_parse(target, &request->uri);
     if (wrong) {
-        respond_refusal(request, strlen(target) > URI_MAX_LENGTH ? 414 : 400, "bad-request", bad_request, "%s", wrong);
+        respond_refusal(request, strlen(target) > URI_MAX_LENGTH ? 414 : 400, "bad-request", bad_request,
+                        "%s", wrong);
         request->close = true;
     }
     if (!request->link) {
@@ -515,11 +550,13 @@ static void *on_target(void *user, const char *target, struct MHD_Connection *co
 
 static void remote_of(struct request *request, char *text, size_t capacity)
 {
-    const union MHD_ConnectionInfo *info = MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+    const union MHD_ConnectionInfo *info =
+        MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
     text[0] = 0;
     if (!info || !info->client_addr)
         return;
-    socklen_t size = info->client_addr->sa_family == AF_INET6 ? sizeof(struct sockaddr_in6) : sizeof(struct sockaddr_in);
+    socklen_t size =
+        info->client_addr->sa_family == AF_INET6 ? sizeof(struct sockaddr_in6) : sizeof(struct sockaddr_in);
     if (getnameinfo(info->client_addr, size, text, (socklen_t)capacity, NULL, 0, NI_NUMERICHOST))
         text[0] = 0;
 }
@@ -529,19 +566,23 @@ static void write_access_log(struct request *request, double seconds, enum MHD_R
     char members[900], path[400], remote[64];
     int status = request->response.status;
     bool quiet = request->route && (request->route->flags & ROUTE_QUIET);
-    enum config_log_level level = status >= 500 ? CONFIG_LOG_WARNING : quiet ? CONFIG_LOG_DEBUG : CONFIG_LOG_INFO;
+    enum config_log_level level = status >= 500 ? CONFIG_LOG_WARNING
+                                  : quiet       ? CONFIG_LOG_DEBUG
+                                                : CONFIG_LOG_INFO;
     if (!log_wants(level))
         return;
     remote_of(request, remote, sizeof remote);
     snprintf(members, sizeof members,
-             "\"request\":\"%s\",\"method\":\"%s\",\"path\":\"%s\",\"status\":%d,\"seconds\":%.6f,\"received\":%llu,\"sent\":%llu,\"remote\":\"%s\"%s",
+             "\"request\":\"%s\",\"method\":\"%s\",\"path\":\"%s\",\"status\":%d,\"seconds\":%.6f,"
+             "\"received\":%llu,\"sent\":%llu,\"remote\":\"%s\"%s",
              request->id, request->method, log_escape(request->path, path, sizeof path), status, seconds,
              (unsigned long long)request->n_received, (unsigned long long)request->n_sent, remote,
              code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? "" : ",\"broken\":true");
     log_members(level, "request", members);
 }
 
-static void on_completed(void *user, struct MHD_Connection *connection, void **state, enum MHD_RequestTerminationCode code)
+static void on_completed(void *user, struct MHD_Connection *connection, void **state,
+                         enum MHD_RequestTerminationCode code)
 {
     struct server *server = user;
     struct request *request = *state;
@@ -550,7 +591,8 @@ static void on_completed(void *user, struct MHD_Connection *connection, void **s
         return;
     double seconds = (double)(now_us() - request->started_us) * 1e-6;
     size_t row = request->route ? (size_t)(request->route - server->routes) : server->n_routes;
-    metrics_request(server->metrics, row, request->response.status, seconds, request->n_received, request->n_sent);
+    metrics_request(server->metrics, row, request->response.status, seconds, request->n_received,
+                    request->n_sent);
     write_access_log(request, seconds, code);
     link_head(request->link);
     blobs_abort(request->blob);
@@ -571,7 +613,8 @@ static void on_connection(void *user, struct MHD_Connection *connection, void **
 {
     struct server *server = user;
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
-        const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+        const union MHD_ConnectionInfo *info =
+            MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
         *context = info ? connections_open(server->connections, info->connect_fd) : NULL;
     } else if (*context) {
         connections_close(server->connections, *context);
@@ -607,11 +650,11 @@ static struct MHD_Daemon *start_mhd(struct server *server, int listen_fd)
 {
     const struct config *config = server->service->config;
     return MHD_start_daemon(
-        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG, 0, NULL, NULL, on_access, server,
-        MHD_OPTION_EXTERNAL_LOGGER, on_log, NULL, MHD_OPTION_LISTEN_SOCKET, (MHD_socket)listen_fd,
-        MHD_OPTION_THREAD_POOL_SIZE, (unsigned)config->http_threads, MHD_OPTION_CONNECTION_LIMIT,
-        (unsigned)config->connections, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)128 << 10,
-        MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)config->idle_timeout_s,
+        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG, 0, NULL, NULL,
+        on_access, server, MHD_OPTION_EXTERNAL_LOGGER, on_log, NULL, MHD_OPTION_LISTEN_SOCKET,
+        (MHD_socket)listen_fd, MHD_OPTION_THREAD_POOL_SIZE, (unsigned)config->http_threads,
+        MHD_OPTION_CONNECTION_LIMIT, (unsigned)config->connections, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+        (size_t)128 << 10, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)config->idle_timeout_s,
         MHD_OPTION_URI_LOG_CALLBACK, on_target, server, MHD_OPTION_NOTIFY_COMPLETED, on_completed, server,
         MHD_OPTION_NOTIFY_CONNECTION, on_connection, server, MHD_OPTION_END);
 }
@@ -633,7 +676,9 @@ groom_status server_start(const struct server_options *options, struct server **
         goto out;
     status = GROOM_ENOMEM;
     if (!(server->followers = followers_create(options->service->jobs, server->fast)) ||
-        !(server->connections = connections_create(config)) || !(server->metrics = metrics_create(options->n_routes)) ||
+        !(server->connections = connections_create(config)) ||
+        !(server->metrics = metrics_create(options->n_routes)) ||
+        !(server->exports = export_cache_create(config->export_cache)) ||
         pthread_create(&server->ticker, NULL, tick, server))
         goto out;
     server->has_ticker = true;
@@ -687,5 +732,6 @@ void server_destroy(struct server *server)
     followers_destroy(server->followers);
     connections_destroy(server->connections);
     metrics_destroy(server->metrics);
+    export_cache_destroy(server->exports);
     free(server);
 }

@@ -11,6 +11,7 @@
 #define HTTP_SERVER_H
 
 #include "server/http/connections.h"
+#include "server/http/export_cache.h"
 #include "server/http/follow.h"
 #include "server/http/metrics.h"
 #include "server/http/request.h"
@@ -34,9 +35,11 @@ void server_destroy(struct server *server); /* takes NULL; after a server_stop t
 struct metrics *server_metrics(struct server *server);
 struct followers *server_followers(struct server *server);
 uint64_t server_connections(struct server *server);
+struct export_cache *server_exports(struct server *server);
 struct lane *server_lane(struct server *server, enum lane_name name);
 bool server_is_draining(const struct server *server); /* what waits is to come to an end */
-/* Around a connection that waits in an event stream; server_suspended returns false where the server is closing. */
+/* Around a connection that waits in an event stream; server_suspended returns false where the server is
+ * closing. */
 bool server_suspended(struct server *server);
 void server_resumed(struct server *server);
 

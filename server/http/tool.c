@@ -14,7 +14,7 @@
 #include "server/log.h"
 
 #define MAX_ARGUMENTS 16
-#define MAX_PROBLEM 65536
+#define MAX_PROBLEM   65536
 
 /* --- groom-worker ------------------------------------------------------------------------ */
 
@@ -41,10 +41,12 @@ static void respond_child_failure(struct request *request, const struct child_re
     struct problem problem;
     char words[CHILD_WORDS_SIZE * 2], members[CHILD_WORDS_SIZE * 2 + 200];
     if (result->timed_out) {
-        problem_set(&problem, 422, "too-slow", "reading it takes too long", "it was given up after %llu s (--parse-time)",
+        problem_set(&problem, 422, "too-slow", "reading it takes too long",
+                    "it was given up after %llu s (--parse-time)",
                     (unsigned long long)request->service->config->parse_time_s);
     } else if (result->exit_status != 1 || !read_problem(result, stdout_fd, &problem)) {
-        snprintf(members, sizeof members, "\"request\":\"%s\",\"exit_status\":%d,\"signal\":%d,\"words\":\"%s\"", request->id,
+        snprintf(members, sizeof members,
+                 "\"request\":\"%s\",\"exit_status\":%d,\"signal\":%d,\"words\":\"%s\"", request->id,
                  result->exit_status, result->signal, log_escape(result->words, words, sizeof words));
         log_members(CONFIG_LOG_ERROR, "groom-worker did not do its work", members);
         problem_set(&problem, 500, "internal", "a part of the service failed in a way it should not",
@@ -54,8 +56,8 @@ static void respond_child_failure(struct request *request, const struct child_re
     respond_problem(request, &problem);
 }
 
-bool tool_run(struct request *request, const char *const *arguments, int stdin_fd, int stdout_fd, char **output,
-              size_t *n_output)
+bool tool_run(struct request *request, const char *const *arguments, int stdin_fd, int stdout_fd,
+              char **output, size_t *n_output)
 {
     const struct config *config = request->service->config;
     const char *argv[MAX_ARGUMENTS] = {request->service->worker_path};
@@ -64,8 +66,12 @@ bool tool_run(struct request *request, const char *const *arguments, int stdin_f
     for (size_t n = 1; *arguments && n + 1 < MAX_ARGUMENTS; n++)
         argv[n] = *arguments++;
     struct child_spec spec = {
-        .argv = argv, .stdin_fd = stdin_fd, .stdout_fd = stdout_fd, .wall_ms = (uint32_t)config->parse_time_s * 1000,
-        .limits = {.memory_bytes = config->parse_memory, .file_bytes = stdout_fd < 0 ? LAUNCH_NO_FILES : config->max_upload * 16}};
+        .argv = argv,
+        .stdin_fd = stdin_fd,
+        .stdout_fd = stdout_fd,
+        .wall_ms = (uint32_t)config->parse_time_s * 1000,
+        .limits = {.memory_bytes = config->parse_memory,
+                   .file_bytes = stdout_fd < 0 ? LAUNCH_NO_FILES : config->max_upload * 16}};
     if (stdin_fd >= 0 && lseek(stdin_fd, 0, SEEK_SET) < 0) {
         respond_failure(request, GROOM_EIO, NULL);
         return false;
@@ -94,7 +100,8 @@ int tool_temporary(struct request *request)
     int fd = open(request->service->temporary_folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
     if (fd < 0) {
         struct groom_diag diag = {0};
-        groom_status status = groom_fail(&diag, errno == ENOSPC ? GROOM_ENOSPC : GROOM_EIO, "no temporary file: %s", strerror(errno));
+        groom_status status = groom_fail(&diag, errno == ENOSPC ? GROOM_ENOSPC : GROOM_EIO,
+                                         "no temporary file: %s", strerror(errno));
         respond_failure(request, status, &diag);
     }
     return fd;
@@ -178,9 +185,11 @@ bool tool_query_frame(struct request *request, struct groom_frame *frame)
     return true;
 }
 
-void tool_respond_file(struct request *request, groom_format format, const char *name, const char *etag, int fd, uint64_t n_bytes)
+void tool_respond_file(struct request *request, groom_format format, const char *name, const char *etag,
+                       int fd, uint64_t n_bytes)
 {
     respond_file(request, groom_format_media_type(format), fd, n_bytes);
-    respond_header(request, "Content-Disposition", "attachment; filename=\"%s.%s\"", name, groom_format_extension(format));
+    respond_header(request, "Content-Disposition", "attachment; filename=\"%s.%s\"", name,
+                   groom_format_extension(format));
     respond_etag(request, "%s", etag);
 }

@@ -10,8 +10,8 @@
  * stdin_fd   read from its beginning
  * stdout_fd  takes its output; -1: *output, malloc'ed and zero-terminated
  * returns    false where it failed: the problem that it printed, or that it was stopped, is answered */
-bool tool_run(struct request *request, const char *const *arguments, int stdin_fd, int stdout_fd, char **output,
-              size_t *n_output);
+bool tool_run(struct request *request, const char *const *arguments, int stdin_fd, int stdout_fd,
+              char **output, size_t *n_output);
 
 /* A file without a name on the disk of the data; -1 where it was refused (and answered). */
 int tool_temporary(struct request *request);
@@ -32,6 +32,7 @@ bool tool_query_format(struct request *request, bool writing, groom_format *form
 bool tool_query_frame(struct request *request, struct groom_frame *frame);
 
 /* Answer with a file to be kept: Content-Type, Content-Disposition "<name>.<extension>", ETag. */
-void tool_respond_file(struct request *request, groom_format format, const char *name, const char *etag, int fd, uint64_t n_bytes);
+void tool_respond_file(struct request *request, groom_format format, const char *name, const char *etag,
+                       int fd, uint64_t n_bytes);
 
 #endif

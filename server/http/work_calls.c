@@ -51,8 +51,8 @@ void work_call_progress(struct request *request)
 {
     bool cancel;
     struct groom_diag diag = {0};
-    groom_status status = work_progress(request->service->jobs, &request->attempt, request->body ? request->body : "",
-                                        request->n_body, &cancel, &diag);
+    groom_status status = work_progress(request->service->jobs, &request->attempt,
+                                        request->body ? request->body : "", request->n_body, &cancel, &diag);
     if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
         return;
@@ -78,7 +78,8 @@ int work_check_stage(struct request *request)
 
 static void respond_empty_body(struct request *request)
 {
-    respond_refusal(request, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL), "the body is empty");
+    respond_refusal(request, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL),
+                    "the body is empty");
 }
 
 void work_call_checkpoint(struct request *request)
@@ -96,15 +97,16 @@ void work_call_checkpoint(struct request *request)
     request->blob = NULL;
     groom_status status = blobs_commit(writer, NULL, sha256, &diag);
     if (status == GROOM_OK)
-        status = work_checkpoint(request->service->jobs, &request->attempt, sha256, n_bytes, (uint32_t)stage, &diag);
+        status = work_checkpoint(request->service->jobs, &request->attempt, sha256, n_bytes, (uint32_t)stage,
+                                 &diag);
     respond_done(request, status, &diag);
 }
 
 /* --- the result ------------------------------------------------------------------------------ */
 
 /* Where the groom comes from: the job and what it was given. */
-static groom_status prepare(struct request *request, const char *document, size_t n_bytes, struct grooms_prepared *prepared,
-                            struct groom_diag *diag)
+static groom_status prepare(struct request *request, const char *document, size_t n_bytes,
+                            struct grooms_prepared *prepared, struct groom_diag *diag)
 {
     struct store_job job = {0};
     groom_status status = jobs_get(request->service->jobs, request->attempt.job_id, &job, diag);
@@ -113,7 +115,9 @@ static groom_status prepare(struct request *request, const char *document, size_
     cJSON *inputs = json_text_parse(job.request, strlen(job.request), NULL);
     const struct grooms_source source = {
         .strands = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(inputs, "strands")),
-        .head = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(inputs, "head")), .job = job.id, .note = job.kind};
+        .head = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(inputs, "head")),
+        .job = job.id,
+        .note = job.kind};
     status = grooms_prepare(request->service->grooms, document, n_bytes, &source, prepared, diag);
     cJSON_Delete(inputs);
     store_job_finish(&job);
@@ -145,7 +149,7 @@ void work_call_result(struct request *request)
 void work_call_failed(struct request *request)
 {
     struct groom_diag diag = {0};
-    groom_status status = work_failed(request->service->jobs, &request->attempt, request->body ? request->body : "",
-                                      request->n_body, &diag);
+    groom_status status = work_failed(request->service->jobs, &request->attempt,
+                                      request->body ? request->body : "", request->n_body, &diag);
     respond_done(request, status, &diag);
 }

@@ -7,7 +7,8 @@
 #include "server/config.h"
 #include "tests/support/test.h"
 
-static groom_status load(struct config *config, char *const *environment, char *a, char *b, struct groom_diag *diag)
+static groom_status load(struct config *config, char *const *environment, char *a, char *b,
+                         struct groom_diag *diag)
 {
     char program[] = "groomd";
     char *argv[] = {program, a, b, NULL};
@@ -38,7 +39,8 @@ END_TEST
 START_TEST(command_line_wins_over_environment_over_file)
 {
     char path[40], variable[64], workers[] = "GROOMD_WORKERS=5", level[] = "GROOMD_LOG_LEVEL=debug";
-    write_file(path, "# a comment\nworkers = 4\n\n max-upload=2M # here too\nlog-level = error\nhttp-threads = 7\n");
+    write_file(
+        path, "# a comment\nworkers = 4\n\n max-upload=2M # here too\nlog-level = error\nhttp-threads = 7\n");
     snprintf(variable, sizeof variable, "GROOMD_CONFIG=%s", path);
     char *const environment[] = {variable, workers, level, NULL};
     struct config config;

@@ -43,8 +43,22 @@ END_TEST
 
 START_TEST(uri_refuses_what_is_no_honest_target)
 {
-    static const char *const bad[] = {"", "v1", "*", "/a/../b", "/a/%2e%2e/b", "/%", "/%4", "/%zz", "/%00", "/a%0ab", "/%ff",
-                                      "/%c0%af", "/%ed%a0%80", "/?a=1&a=2", "/?a=%", "/1/2/3/4/5/6/7/8/9/10/11/12/13/14/15/16/17"};
+    static const char *const bad[] = {"",
+                                      "v1",
+                                      "*",
+                                      "/a/../b",
+                                      "/a/%2e%2e/b",
+                                      "/%",
+                                      "/%4",
+                                      "/%zz",
+                                      "/%00",
+                                      "/a%0ab",
+                                      "/%ff",
+                                      "/%c0%af",
+                                      "/%ed%a0%80",
+                                      "/?a=1&a=2",
+                                      "/?a=%",
+                                      "/1/2/3/4/5/6/7/8/9/10/11/12/13/14/15/16/17"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         struct uri uri;
         ck_assert_msg(uri_parse(bad[i], &uri) != NULL, "%s", bad[i]);
@@ -56,7 +70,8 @@ END_TEST
 START_TEST(problem_survives_the_way_through_json)
 {
     struct problem problem, again;
-    problem_set(&problem, 422, "invalid-file", "the data is not what its format promises", "strand %d has no end", 7);
+    problem_set(&problem, 422, "invalid-file", "the data is not what its format promises",
+                "strand %d has no end", 7);
     problem.byte_offset = 128;
     strcpy(problem.pointer, "/strands/7");
     char *text = problem_print(&problem);
@@ -87,4 +102,5 @@ START_TEST(problem_believes_no_odd_json)
 END_TEST
 
 TEST_SUITE("proto", uri_splits_before_it_decodes, uri_takes_root_empty_segments_and_absolute_targets,
-           uri_refuses_what_is_no_honest_target, problem_survives_the_way_through_json, problem_believes_no_odd_json)
+           uri_refuses_what_is_no_honest_target, problem_survives_the_way_through_json,
+           problem_believes_no_odd_json)

@@ -15,7 +15,8 @@ static const struct route routes[] = {
     {"GET", "/v1/a/{x}/{y}", nothing, BODY_NONE, LANE_FAST, "", 0, NULL},
 };
 
-static enum router_outcome find(const char *method, const char *target, struct router_match *match, struct uri *uri)
+static enum router_outcome find(const char *method, const char *target, struct router_match *match,
+                                struct uri *uri)
 {
     ck_assert_ptr_null(uri_parse(target, uri));
     return router_find(routes, sizeof routes / sizeof routes[0], method, uri, match);
@@ -23,9 +24,16 @@ static enum router_outcome find(const char *method, const char *target, struct r
 
 START_TEST(each_target_finds_its_route)
 {
-    static const struct { const char *method, *target; int route; } cases[] = {
-        {"GET", "/", 0}, {"GET", "/v1/strands", 1}, {"HEAD", "/v1/strands", 1}, {"POST", "/v1/strands", 2},
-        {"GET", "/v1/strands/str_1?x=1", 3}, {"GET", "/v1/strands/str_1/data", 4}, {"GET", "/v1/a/b/c", 5}};
+    static const struct {
+        const char *method, *target;
+        int route;
+    } cases[] = {{"GET", "/", 0},
+                 {"GET", "/v1/strands", 1},
+                 {"HEAD", "/v1/strands", 1},
+                 {"POST", "/v1/strands", 2},
+                 {"GET", "/v1/strands/str_1?x=1", 3},
+                 {"GET", "/v1/strands/str_1/data", 4},
+                 {"GET", "/v1/a/b/c", 5}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct router_match match;
         struct uri uri;
@@ -59,7 +67,9 @@ END_TEST
 
 START_TEST(unknown_paths_find_nothing)
 {
-    static const char *const targets[] = {"/v1", "/v1/strands/", "/v1//strands", "/v1/strands/a/b", "/v1/strands/a/data/", "/V1/strands", "/v1/strandsx"};
+    static const char *const targets[] = {
+        "/v1",         "/v1/strands/", "/v1//strands", "/v1/strands/a/b", "/v1/strands/a/data/",
+        "/V1/strands", "/v1/strandsx"};
     for (size_t i = 0; i < sizeof targets / sizeof targets[0]; i++) {
         struct router_match match;
         struct uri uri;
@@ -79,5 +89,5 @@ START_TEST(lists_of_words)
 }
 END_TEST
 
-TEST_SUITE("router", each_target_finds_its_route, parameters_come_in_order, wrong_method_says_which_are_allowed,
-           unknown_paths_find_nothing, lists_of_words)
+TEST_SUITE("router", each_target_finds_its_route, parameters_come_in_order,
+           wrong_method_says_which_are_allowed, unknown_paths_find_nothing, lists_of_words)

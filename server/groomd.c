@@ -1,0 +1,307 @@
+/* groomd: the daemon. It owns the database and the uploads, answers over HTTP, and launches
+ * groom-worker processes for all that parses untrusted bytes or computes for long.
+ *
+ * This file puts the rooms together and takes them apart in the reverse order:
+ *   folder and lock, listening socket, blobs, store, jobs, grooms, supervisor, server. */
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "server/blobs/blobs.h"
+#include "server/config.h"
+#include "server/grooms/grooms.h"
+#include "server/http/handlers.h"
+#include "server/http/server.h"
+#include "server/jobs/supervisor.h"
+#include "server/launch/launch.h"
+#include "server/listen.h"
+#include "server/log.h"
+
+#define PATH_SIZE 1400
+
+struct daemon {
+    struct config config;
+    int lock_fd;
+    char worker[PATH_SIZE], temporary[PATH_SIZE], logs[PATH_SIZE], threads[48];
+    const char *worker_argv[3], *worker_env[2];
+    struct listening listening;
+    struct blobs *blobs;
+    struct store *store;
+    struct jobs *jobs;
+    struct groom_pool *pool;
+    struct grooms *grooms;
+    struct launcher *launcher;
+    struct supervisor *supervisor;
+    struct service service;
+    struct server *server;
+};
+
+/* --- the folder ------------------------------------------------------------------------ */
+
+static groom_status make_folder(const char *path, struct groom_diag *diag)
+{
+    if (mkdir(path, 0700) == 0 || errno == EEXIST)
+        return GROOM_OK;
+    return groom_fail(diag, GROOM_EIO, "the folder %.200s cannot be made: %s", path, strerror(errno));
+}
+
+/* One daemon for one folder: the lock goes with the process, however that ends. */
+static groom_status lock_folder(struct daemon *daemon, struct groom_diag *diag)
+{
+    char path[PATH_SIZE], pid[32];
+    snprintf(path, sizeof path, "%s/lock", daemon->config.data);
+    daemon->lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+    if (daemon->lock_fd < 0)
+        return groom_fail(diag, GROOM_EIO, "%.200s cannot be opened: %s", path, strerror(errno));
+    if (flock(daemon->lock_fd, LOCK_EX | LOCK_NB))
+        return groom_fail(diag, GROOM_ECONFLICT,
+                          "another groomd works on %.200s; stop it, or name another folder with --data",
+                          daemon->config.data);
+    int n = snprintf(pid, sizeof pid, "%ld\n", (long)getpid());
+    if (ftruncate(daemon->lock_fd, 0) || write(daemon->lock_fd, pid, (size_t)n) != n)
+        log_message(CONFIG_LOG_WARNING, "the process id could not be noted in %s", path);
+    return GROOM_OK;
+}
+
+static groom_status open_folder(struct daemon *daemon, struct groom_diag *diag)
+{
+    groom_status status;
+    snprintf(daemon->temporary, sizeof daemon->temporary, "%s/tmp", daemon->config.data);
+    snprintf(daemon->logs, sizeof daemon->logs, "%s/logs", daemon->config.data);
+    if ((status = make_folder(daemon->config.data, diag)) != GROOM_OK ||
+        (status = lock_folder(daemon, diag)) != GROOM_OK ||
+        (status = make_folder(daemon->temporary, diag)) != GROOM_OK)
+        return status;
+    return make_folder(daemon->logs, diag);
+}
+
+/* --- the worker program ------------------------------------------------------------------- */
+
+static groom_status find_worker(struct daemon *daemon, struct groom_diag *diag)
+{
+    char *slash;
+    if (daemon->config.worker[0]) {
+        snprintf(daemon->worker, sizeof daemon->worker, "%s", daemon->config.worker);
+    } else {
+        ssize_t n = readlink("/proc/self/exe", daemon->worker, sizeof daemon->worker - 32);
+        daemon->worker[n > 0 ? n : 0] = 0;
+        if (!(slash = strrchr(daemon->worker, '/')))
+            return groom_fail(diag, GROOM_EIO,
+                              "the place of groomd is not known; name groom-worker with --worker");
+        strcpy(slash + 1, "groom-worker");
+    }
+    if (access(daemon->worker, X_OK))
+        return groom_fail(diag, GROOM_EINVAL, "groom-worker is not at %.200s (%s); name it with --worker",
+                          daemon->worker, strerror(errno));
+    return GROOM_OK;
+}
+
+/* Workers share the processors. */
+static void choose_threads(struct daemon *daemon)
+{
+    const struct config *config = &daemon->config;
+    long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    unsigned long long threads = config->worker_threads;
+    if (!threads)
+        threads = processors > (long)config->workers ? (unsigned long long)processors / config->workers : 1;
+    snprintf(daemon->threads, sizeof daemon->threads, "GROOM_WORK_THREADS=%llu", threads);
+    daemon->worker_env[0] = daemon->threads;
+    daemon->worker_argv[0] = daemon->worker;
+    daemon->worker_argv[1] = "attempt";
+}
+
+/* --- the rooms ------------------------------------------------------------------------------ */
+
+static groom_status open_state(struct daemon *daemon, struct groom_diag *diag)
+{
+    char path[PATH_SIZE];
+    groom_status status;
+    uint64_t n_removed = 0;
+    snprintf(path, sizeof path, "%s/blobs", daemon->config.data);
+    if ((status = blobs_open(path, NULL, &daemon->blobs, diag)) != GROOM_OK)
+        return status;
+    snprintf(path, sizeof path, "%s/groomd.db", daemon->config.data);
+    if ((status = store_open(path, &daemon->store, diag)) != GROOM_OK ||
+        (status = jobs_create(daemon->store, daemon->blobs, &daemon->jobs, diag)) != GROOM_OK)
+        return status;
+    status = jobs_collect_blobs(daemon->jobs, &n_removed, diag);
+    if (n_removed)
+        log_message(CONFIG_LOG_INFO, "%llu uploads that were never finished have been removed",
+                    (unsigned long long)n_removed);
+    return status;
+}
+
+static groom_status open_grooms(struct daemon *daemon, struct groom_diag *diag)
+{
+    groom_status status = groom_pool_create(0, &daemon->pool);
+    if (status != GROOM_OK)
+        return status;
+    const struct grooms_options options = {.store = daemon->store,
+                                           .blobs = daemon->blobs,
+                                           .pool = daemon->pool,
+                                           .worker_path = daemon->worker,
+                                           .temporary_folder = daemon->temporary};
+    return grooms_create(&options, &daemon->grooms, diag);
+}
+
+static groom_status start_supervisor(struct daemon *daemon, struct groom_diag *diag)
+{
+    const struct config *config = &daemon->config;
+    groom_status status;
+    if (strcmp(config->launcher, "local"))
+        return groom_fail(diag, GROOM_EINVAL, "--launcher %.60s: this version has local alone",
+                          config->launcher);
+    choose_threads(daemon);
+    if ((status = launch_local_create(&daemon->launcher, diag)) != GROOM_OK)
+        return status;
+    const struct supervisor_options options = {
+        .n_slots = (uint32_t)config->workers,
+        .max_deaths = (uint32_t)config->job_attempts,
+        .launcher = daemon->launcher,
+        .worker_argv = daemon->worker_argv,
+        .worker_env = daemon->worker_env,
+        .work_url = daemon->listening.url,
+        .log_folder = daemon->logs,
+        .limits = {.memory_bytes = config->worker_memory, .cpu_s = config->job_time_s}};
+    return supervisor_start(daemon->jobs, &options, &daemon->supervisor, diag);
+}
+
+static groom_status start_server(struct daemon *daemon, struct groom_diag *diag)
+{
+    daemon->service = (struct service){.config = &daemon->config,
+                                       .store = daemon->store,
+                                       .blobs = daemon->blobs,
+                                       .jobs = daemon->jobs,
+                                       .grooms = daemon->grooms,
+                                       .supervisor = daemon->supervisor,
+                                       .worker_path = daemon->worker,
+                                       .temporary_folder = daemon->temporary};
+    const struct server_options options = {.service = &daemon->service,
+                                           .routes = http_routes,
+                                           .n_routes = http_n_routes,
+                                           .listen_fd = daemon->listening.fd};
+    daemon->listening.fd = -1;
+    return server_start(&options, &daemon->server, diag);
+}
+
+/* The socket listens before the supervisor starts, so that a worker that is quick only waits. */
+static groom_status start(struct daemon *daemon, struct groom_diag *diag)
+{
+    groom_status status;
+    if ((status = find_worker(daemon, diag)) != GROOM_OK ||
+        (status = listen_open(daemon->config.listen, &daemon->listening, diag)) != GROOM_OK ||
+        (status = open_folder(daemon, diag)) != GROOM_OK || (status = open_state(daemon, diag)) != GROOM_OK ||
+        (status = open_grooms(daemon, diag)) != GROOM_OK ||
+        (status = start_supervisor(daemon, diag)) != GROOM_OK)
+        return status;
+    return start_server(daemon, diag);
+}
+
+static void finish(struct daemon *daemon)
+{
+    server_destroy(daemon->server);
+    supervisor_destroy(daemon->supervisor);
+    launch_destroy(daemon->launcher);
+    grooms_destroy(daemon->grooms);
+    groom_pool_destroy(daemon->pool);
+    jobs_destroy(daemon->jobs);
+    store_close(daemon->store);
+    blobs_close(daemon->blobs);
+    if (daemon->listening.fd >= 0)
+        close(daemon->listening.fd);
+    if (daemon->lock_fd >= 0)
+        close(daemon->lock_fd);
+}
+
+/* --- the end --------------------------------------------------------------------------------- */
+
+static int64_t now_ms(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+/* Workers first, while they can still bring their checkpoints; then the requests. What is still
+ * under way after that is cut: nothing that was acknowledged is lost by it. */
+static void stop(struct daemon *daemon)
+{
+    int64_t until = now_ms() + (int64_t)daemon->config.shutdown_s * 1000;
+    log_message(CONFIG_LOG_INFO, "stopping");
+    supervisor_drain(daemon->supervisor, (uint32_t)daemon->config.shutdown_s * 500);
+    int64_t left = until - now_ms();
+    if (!server_stop(daemon->server, left > 500 ? (uint32_t)left : 500)) {
+        log_message(CONFIG_LOG_WARNING, "some requests were cut: they took longer than --shutdown-time");
+        _exit(0);
+    }
+    log_message(CONFIG_LOG_INFO, "stopped");
+}
+
+/* Signals are taken here and nowhere else: every thread that is started later inherits the mask. */
+static void block_signals(sigset_t *signals)
+{
+    sigemptyset(signals);
+    sigaddset(signals, SIGTERM);
+    sigaddset(signals, SIGINT);
+    pthread_sigmask(SIG_BLOCK, signals, NULL);
+    signal(SIGPIPE, SIG_IGN);
+}
+
+static void raise_descriptor_limit(void)
+{
+    struct rlimit limit;
+    if (!getrlimit(RLIMIT_NOFILE, &limit) && limit.rlim_cur < limit.rlim_max) {
+        limit.rlim_cur = limit.rlim_max;
+        setrlimit(RLIMIT_NOFILE, &limit);
+    }
+}
+
+static void run(struct daemon *daemon, const sigset_t *signals)
+{
+    int signal_number = 0;
+    printf("listening on %s\n", daemon->listening.url);
+    fflush(stdout);
+    log_message(CONFIG_LOG_INFO, "listening on %s", daemon->listening.url);
+    while (sigwait(signals, &signal_number))
+        ;
+    pthread_sigmask(SIG_UNBLOCK, signals, NULL); /* a second signal ends it at once */
+    stop(daemon);
+}
+
+int main(int argc, char **argv)
+{
+    static struct daemon daemon = {.lock_fd = -1, .listening.fd = -1};
+    struct groom_diag diag = {0};
+    enum config_action action;
+    sigset_t signals;
+    groom_status status = config_load(argc, argv, environ, &daemon.config, &action, &diag);
+    if (status == GROOM_OK && action == CONFIG_HELP) {
+        config_help(stdout);
+        return 0;
+    }
+    if (status == GROOM_OK && action == CONFIG_VERSION) {
+        puts("groomd 1");
+        return 0;
+    }
+    if (status != GROOM_OK) {
+        fprintf(stderr, "groomd: %s\n", diag.detail);
+        return 2;
+    }
+    log_set_level((enum config_log_level)daemon.config.log_level);
+    raise_descriptor_limit();
+    block_signals(&signals);
+    if ((status = start(&daemon, &diag)) == GROOM_OK)
+        run(&daemon, &signals);
+    else
+        fprintf(stderr, "groomd: %s\n", diag.status == status ? diag.detail : groom_status_message(status));
+    finish(&daemon);
+    return status == GROOM_OK ? 0 : 1;
+}
