@@ -137,10 +137,13 @@ asan tsan:
 # Every parser under libFuzzer with AddressSanitizer (clang). The corpus of each is replayed by
 # `make test` through the same entry point, built by the ordinary compiler.
 FUZZ_BUILD = build/fuzz
-$(FUZZ_BUILD)/fuzz_%: tests/fuzz/fuzz_%.c $(LIB_SOURCES) $(wildcard lib/*/*.h lib/include/groom/*.h)
+FUZZ_FLAGS = -std=c11 -D_GNU_SOURCE -O1 -g -fsanitize=address,undefined -fno-sanitize-recover=undefined -Wno-pass-failed
+fuzz_objects = $(patsubst %.c,$(FUZZ_BUILD)/obj/%.o,$(1))
+$(FUZZ_BUILD)/obj/%.o: %.c
 	@mkdir -p $(@D)
-	clang -std=c11 -D_GNU_SOURCE -O1 -g -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=undefined \
-	    $(INCLUDES) -o $@ $< $(LIB_SOURCES) $(LIBS_LIB) -pthread
+	clang $(FUZZ_FLAGS) -fsanitize=fuzzer-no-link $(INCLUDES) -MMD -MP -c $< -o $@
+$(FUZZ_BUILD)/fuzz_%: $(FUZZ_BUILD)/obj/tests/fuzz/fuzz_%.o $(call fuzz_objects,$(LIB_SOURCES))
+	clang $(FUZZ_FLAGS) -fsanitize=fuzzer -o $@ $^ $(LIBS_LIB) -pthread
 
 fuzz: setup
 	@$(SUBMAKE) $(addprefix $(FUZZ_BUILD)/fuzz_,$(FUZZERS))
@@ -180,4 +183,4 @@ clean:
 	rm -rf build
 
 .SECONDARY:
--include $(shell find $(BUILD)/obj -name '*.d' 2>/dev/null)
+-include $(shell find $(BUILD)/obj $(FUZZ_BUILD)/obj -name '*.d' 2>/dev/null)
