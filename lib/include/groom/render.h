@@ -1,8 +1,9 @@
 /* Still pictures of hair, by a rasteriser of our own: what a preview shows without a graphics card.
  *
- * Strands are lines of the width of hair, antialiased by coverage in depth order, shaded by
- * Kajiya and Kay (1989) under a key and a rim light and darkened by the hair between them and the
- * light; the head is a shaded z-buffered mesh that hides what lies behind it. */
+ * Strands are lines of the width of hair in a depth buffer of 4 to 16 samples a pixel, shaded by
+ * Kajiya and Kay (1989) with the second, coloured highlight of Marschner et al. (2003) under a key
+ * and a rim light, and darkened by the hair around them; the head is a shaded mesh in the same
+ * buffer. Memory: 16 bytes a vertex and about 40 MB. */
 #ifndef GROOM_RENDER_H
 #define GROOM_RENDER_H
 
@@ -19,7 +20,7 @@ extern "C" {
 #endif
 
 /* Where the camera stands, in the library's frame: y up, the face towards +z. The front view looks
- * along -z and has the person's left (+x) on the right; the side view looks from the person's left
+ * along -z and has the person's left (+x) on the right of the picture; the side view looks from the person's left
  * (+x) along -x and has the face on the left; the back view looks along +z; the top view looks down
  * with the face at the bottom of the picture.
  * X(constant, name) */
@@ -46,8 +47,8 @@ GROOM_MUST_CHECK groom_status groom_view_parse(const char *name, groom_view *vie
 struct groom_render_options {
     groom_view view;
     uint32_t size;      /* the picture is size x size pixels */
-    float width_m;      /* of a hair; 0: as wide as its share of the scalp asks for */
-    float color[3];     /* of hair, linear 0..1; {0, 0, 0}: a dark brown */
+    float width_m;      /* of a hair; 0: 0.08 mm on a full head, wider for fewer strands */
+    float color[3];     /* of hair, linear 0..1; {0, 0, 0}: brown */
 };
 
 /* Draw strands, on a head if there is one.

@@ -1,0 +1,65 @@
+/* What the steps of drawing a picture hand to each other. */
+#ifndef RENDER_SCENE_H
+#define RENDER_SCENE_H
+
+#include "groom/camera.h"
+#include "groom/render.h"
+
+#define RENDER_PIECE 4096u /* strands or vertices of one piece of a parallel loop */
+
+/* A vertex as the rasteriser sees it: x and y in samples from the upper left corner, depth in metres. */
+struct render_vertex {
+    float x, y, depth;
+    uint32_t color; /* of hair: of the segment that begins here. Packed by color_pack */
+};
+
+/* Where hair is thick: how much of each light reaches a place through it. */
+struct render_light_grid {
+    uint32_t size[3];      /* cells */
+    float origin[3], cell; /* corner of the first; edge length (m) */
+    uint64_t *length;      /* [cells] hair in the cell, in 1/1024 of its edge */
+    float *key;            /* [cells] optical depth towards the key light */
+    float *ambient;        /* [cells] how much of the surroundings is seen, 0..1 */
+};
+
+struct render_scene {
+    const struct groom_strands *strands;
+    const struct groom_mesh *head; /* or NULL */
+    const struct groom_context *context;
+    const struct groom_allocator *allocator;
+    struct groom_camera camera;    /* in samples */
+    uint32_t size, samples;        /* pixels a side; samples a side of a pixel */
+    float hair_min[3], hair_max[3];
+    float width;                   /* of a drawn hair, metres */
+    float color[3];
+    float key[3], rim[3], view[3]; /* unit vectors towards the lights and the camera */
+    struct render_light_grid grid;
+    struct render_vertex *hair;    /* [strands->n_vertices] */
+    struct render_vertex *skin;    /* [head->n_vertices] */
+};
+
+/* frame.c: the camera, the lights that go with it, the hair's box and width */
+GROOM_MUST_CHECK groom_status render_frame(struct render_scene *scene, groom_view view, struct groom_diag *diag);
+
+/* light.c: fill scene->grid */
+GROOM_MUST_CHECK groom_status render_light_create(struct render_scene *scene, struct groom_diag *diag);
+void render_light_destroy(struct render_scene *scene);
+/* At a place: the fraction of the key light and of the surroundings that reach it. */
+void render_light_at(const struct render_light_grid *grid, const float p[3], float *key, float *ambient);
+
+/* shade.c: fill scene->hair and scene->skin */
+GROOM_MUST_CHECK groom_status render_shade(struct render_scene *scene, struct groom_diag *diag);
+
+/* raster.c: the picture */
+GROOM_MUST_CHECK groom_status render_raster(struct render_scene *scene, uint8_t *rgba, struct groom_diag *diag);
+
+/* Linear 0..1 in ten bits of its square root each: finer than an eye tells apart. */
+uint32_t color_pack(const float linear[3]);
+void color_unpack(uint32_t packed, float linear[3]);
+
+static inline int render_is_finite(const float p[3])
+{
+    return __builtin_isfinite(p[0]) && __builtin_isfinite(p[1]) && __builtin_isfinite(p[2]);
+}
+
+#endif

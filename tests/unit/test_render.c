@@ -1,0 +1,244 @@
+/* pictures: hair is there, behind the head it is not, and the same bits come every time */
+#include <math.h>
+#include <png.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "groom/render.h"
+#include "tests/support/test.h"
+
+enum { SIZE = 96, STRANDS = 600, VERTICES = 12 };
+
+/* A tuft of strands that stand on a ball of 0.1 m, towards one side (z = 1: the face's). */
+static struct groom_strands *tuft(float z)
+{
+    struct groom_strands *s;
+    ck_ok(groom_strands_create(STRANDS, STRANDS * VERTICES, NULL, &s, NULL));
+    for (uint32_t i = 0; i < STRANDS; i++) {
+        double a = 0.5 * ((i % 25) / 24.0 - 0.5), b = 0.5 * ((i / 25) / 23.0 - 0.5);
+        s->first[i + 1] = (i + 1) * VERTICES;
+        for (uint32_t j = 0; j < VERTICES; j++) {
+            float r = 0.1f + 0.004f * (float)j, *p = s->points[i * VERTICES + j];
+            p[0] = r * (float)sin(a);
+            p[1] = r * (float)sin(b);
+            p[2] = r * z * (float)(cos(a) * cos(b));
+        }
+    }
+    return s;
+}
+
+static struct groom_mesh *ball(void)
+{
+    struct groom_mesh *mesh;
+    uint32_t n = 24, t = 0;
+    ck_ok(groom_mesh_create((n + 1) * 2 * n, 4 * n * n, 0, NULL, &mesh, NULL));
+    for (uint32_t i = 0; i <= n; i++)
+        for (uint32_t j = 0; j < 2 * n; j++) {
+            float *p = mesh->points[i * 2 * n + j];
+            p[0] = (float)(0.098 * sin(M_PI * i / n) * sin(M_PI * j / n));
+            p[1] = (float)(0.098 * cos(M_PI * i / n));
+            p[2] = (float)(0.098 * sin(M_PI * i / n) * cos(M_PI * j / n));
+        }
+    for (uint32_t i = 0; i < n; i++)
+        for (uint32_t j = 0; j < 2 * n; j++) {
+            uint32_t a = i * 2 * n + j, b = i * 2 * n + (j + 1) % (2 * n);
+            memcpy(mesh->triangles[t++], (uint32_t[3]){a, a + 2 * n, b + 2 * n}, sizeof *mesh->triangles);
+            memcpy(mesh->triangles[t++], (uint32_t[3]){a, b + 2 * n, b}, sizeof *mesh->triangles);
+        }
+    return mesh;
+}
+
+static void draw(const struct groom_strands *s, const struct groom_mesh *head, groom_view view, const struct groom_context *context, uint8_t *rgba)
+{
+    /* green hair: nothing else is */
+    struct groom_render_options options = {.view = view, .size = SIZE, .color = {0.02f, 0.5f, 0.02f}};
+    struct groom_diag diag = {0};
+    groom_status st = groom_render_strands(s, head, &options, rgba, context, &diag);
+    ck_assert_msg(st == GROOM_OK, "%s", diag.detail);
+}
+
+static int count_hair(const uint8_t *rgba)
+{
+    int n = 0;
+    for (int i = 0; i < SIZE * SIZE; i++)
+        n += rgba[i * 4 + 1] > rgba[i * 4] + 25 && rgba[i * 4 + 1] > rgba[i * 4 + 2] + 25;
+    return n;
+}
+
+START_TEST(hair_is_seen_from_every_side)
+{
+    static uint8_t rgba[SIZE * SIZE * 4];
+    struct groom_strands *s = tuft(1);
+    for (int view = 0; view < GROOM_VIEW_COUNT; view++) {
+        draw(s, NULL, (groom_view)view, NULL, rgba);
+        ck_assert_int_gt(count_hair(rgba), SIZE * SIZE / 20);
+        ck_assert_int_lt(count_hair(rgba), SIZE * SIZE * 9 / 10);
+        for (int i = 0; i < SIZE * SIZE; i++)
+            ck_assert_uint_eq(rgba[i * 4 + 3], 255);
+    }
+    groom_strands_destroy(s);
+}
+END_TEST
+
+START_TEST(the_head_hides_hair_behind_it)
+{
+    static uint8_t rgba[SIZE * SIZE * 4];
+    struct groom_strands *face = tuft(1), *back = tuft(-1);
+    struct groom_mesh *head = ball();
+    draw(face, head, GROOM_VIEW_FRONT, NULL, rgba);
+    ck_assert_int_gt(count_hair(rgba), 200);
+    draw(back, head, GROOM_VIEW_FRONT, NULL, rgba);
+    ck_assert_int_eq(count_hair(rgba), 0);
+    draw(back, head, GROOM_VIEW_BACK, NULL, rgba);
+    ck_assert_int_gt(count_hair(rgba), 200);
+    groom_mesh_destroy(head);
+    groom_strands_destroy(face);
+    groom_strands_destroy(back);
+}
+END_TEST
+
+START_TEST(views_are_the_right_way_round)
+{
+    static uint8_t rgba[SIZE * SIZE * 4];
+    struct groom_strands *s = tuft(1);
+    struct groom_mesh *head = ball();
+    int halves[4] = {0}; /* left, right, upper, lower */
+    for (int j = 0; j < VERTICES; j++)
+        s->points[j][2] *= -1; /* one strand at the back, so that the middle of the picture is the middle of the head */
+    draw(s, head, GROOM_VIEW_SIDE, NULL, rgba); /* from the person's left: the face is on the left */
+    for (int i = 0; i < SIZE * SIZE; i++)
+        if (rgba[i * 4 + 1] > rgba[i * 4] + 25)
+            halves[i % SIZE >= SIZE / 2]++;
+    ck_assert_int_gt(halves[0], 50);
+    ck_assert_int_lt(halves[1] * 5, halves[0]);
+    draw(s, head, GROOM_VIEW_TOP, NULL, rgba); /* the face is at the bottom */
+    for (int i = 0; i < SIZE * SIZE; i++)
+        if (rgba[i * 4 + 1] > rgba[i * 4] + 25)
+            halves[2 + (i / SIZE >= SIZE / 2)]++;
+    ck_assert_int_lt(halves[2] * 5, halves[3]);
+    ck_assert_int_gt(halves[3], 50);
+    groom_mesh_destroy(head);
+    groom_strands_destroy(s);
+}
+END_TEST
+
+START_TEST(pictures_are_the_same_bits_for_1_and_3_threads)
+{
+    static uint8_t rgba[2][SIZE * SIZE * 4];
+    struct groom_strands *s = tuft(1);
+    struct groom_mesh *head = ball();
+    for (uint32_t run = 0; run < 2; run++) {
+        struct groom_pool *pool;
+        ck_ok(groom_pool_create(run ? 3 : 1, &pool));
+        struct groom_context context = {.pool = pool};
+        draw(s, head, GROOM_VIEW_FRONT, &context, rgba[run]);
+        groom_pool_destroy(pool);
+    }
+    ck_assert_mem_eq(rgba[0], rgba[1], sizeof rgba[0]);
+    groom_mesh_destroy(head);
+    groom_strands_destroy(s);
+}
+END_TEST
+
+START_TEST(odd_strands_and_options_are_answered_calmly)
+{
+    static uint8_t rgba[SIZE * SIZE * 4];
+    struct groom_render_options options = {.size = SIZE};
+    struct groom_strands *s = tuft(1), *none, *dot;
+    s->points[5][1] = NAN;
+    s->points[100][0] = INFINITY;
+    draw(s, NULL, GROOM_VIEW_FRONT, NULL, rgba);
+    options.size = GROOM_RENDER_MIN_SIZE - 1;
+    ck_status(groom_render_strands(s, NULL, &options, rgba, NULL, NULL), GROOM_EINVAL);
+    options.size = GROOM_RENDER_MAX_SIZE + 1;
+    ck_status(groom_render_strands(s, NULL, &options, rgba, NULL, NULL), GROOM_EINVAL);
+    options = (struct groom_render_options){.size = SIZE, .view = (groom_view)9};
+    ck_status(groom_render_strands(s, NULL, &options, rgba, NULL, NULL), GROOM_EINVAL);
+    options.view = GROOM_VIEW_FRONT;
+    ck_ok(groom_strands_create(0, 0, NULL, &none, NULL));
+    ck_status(groom_render_strands(none, NULL, &options, rgba, NULL, NULL), GROOM_EEMPTY);
+    ck_ok(groom_strands_create(1, 1, NULL, &dot, NULL));
+    dot->first[1] = 1;
+    memset(dot->points[0], 0, sizeof dot->points[0]);
+    ck_ok(groom_render_strands(dot, NULL, &options, rgba, NULL, NULL)); /* one place, no extent */
+    dot->points[0][0] = NAN;
+    ck_status(groom_render_strands(dot, NULL, &options, rgba, NULL, NULL), GROOM_EEMPTY);
+    groom_strands_destroy(dot);
+    groom_strands_destroy(none);
+    groom_strands_destroy(s);
+}
+END_TEST
+
+START_TEST(views_have_names)
+{
+    groom_view view;
+    for (int i = 0; i < GROOM_VIEW_COUNT; i++) {
+        ck_ok(groom_view_parse(groom_view_name((groom_view)i), &view, NULL));
+        ck_assert_int_eq(view, i);
+    }
+    ck_status(groom_view_parse("below", &view, NULL), GROOM_EINVAL);
+}
+END_TEST
+
+struct gathered { uint8_t bytes[1 << 16]; size_t n, room; };
+static groom_status gather(void *user, const void *bytes, size_t n)
+{
+    struct gathered *g = user;
+    if (g->n + n > g->room)
+        return GROOM_ENOSPC;
+    memcpy(g->bytes + g->n, bytes, n);
+    g->n += n;
+    return GROOM_OK;
+}
+
+START_TEST(a_png_decodes_to_the_same_pixels)
+{
+    static uint8_t rgba[SIZE * SIZE * 4], back[SIZE * SIZE * 4];
+    static struct gathered g = {.room = sizeof g.bytes};
+    struct groom_strands *s = tuft(1);
+    png_image image = {.version = PNG_IMAGE_VERSION};
+    draw(s, NULL, GROOM_VIEW_FRONT, NULL, rgba);
+    ck_ok(groom_png_write(rgba, SIZE, SIZE, (struct groom_sink){gather, &g}, NULL, NULL));
+    ck_assert_int_ne(png_image_begin_read_from_memory(&image, g.bytes, g.n), 0);
+    ck_assert_uint_eq(image.width, SIZE);
+    image.format = PNG_FORMAT_RGBA;
+    ck_assert_int_ne(png_image_finish_read(&image, NULL, back, 0, NULL), 0);
+    ck_assert_mem_eq(rgba, back, sizeof rgba);
+    g.n = 0;
+    g.room = 1000;
+    ck_status(groom_png_write(rgba, SIZE, SIZE, (struct groom_sink){gather, &g}, NULL, NULL), GROOM_ENOSPC);
+    ck_status(groom_png_write(rgba, 0, SIZE, (struct groom_sink){gather, &g}, NULL, NULL), GROOM_EINVAL);
+    groom_strands_destroy(s);
+}
+END_TEST
+
+START_TEST(each_failing_allocation_is_reported_and_leaks_nothing)
+{
+    static uint8_t rgba[SIZE * SIZE * 4];
+    static struct gathered g = {.room = sizeof g.bytes};
+    struct groom_strands *s = tuft(1);
+    struct groom_mesh *head = ball();
+    for (size_t fail_at = 0;; fail_at++) {
+        struct test_failing_allocator state;
+        struct groom_allocator allocator;
+        struct groom_render_options options = {.size = SIZE};
+        test_failing_allocator_init(&state, fail_at, &allocator);
+        struct groom_context context = {.allocator = &allocator};
+        groom_status st = groom_render_strands(s, head, &options, rgba, &context, NULL);
+        g.n = 0;
+        if (st == GROOM_OK)
+            st = groom_png_write(rgba, SIZE, SIZE, (struct groom_sink){gather, &g}, &context, NULL);
+        ck_assert_uint_eq(state.outstanding_bytes, 0);
+        if (st == GROOM_OK)
+            break;
+        ck_assert_int_eq(st, GROOM_ENOMEM);
+        ck_assert_uint_lt(fail_at, 100);
+    }
+    groom_mesh_destroy(head);
+    groom_strands_destroy(s);
+}
+END_TEST
+
+TEST_SUITE("render", hair_is_seen_from_every_side, the_head_hides_hair_behind_it, views_are_the_right_way_round,
+           pictures_are_the_same_bits_for_1_and_3_threads, odd_strands_and_options_are_answered_calmly, views_have_names,
+           a_png_decodes_to_the_same_pixels, each_failing_allocation_is_reported_and_leaks_nothing)
