@@ -104,11 +104,13 @@ void work_call_checkpoint(struct request *request)
 
 /* --- the result ------------------------------------------------------------------------------ */
 
-/* Where the groom comes from: the job and what it was given. */
-static groom_status prepare(struct request *request, const char *document, size_t n_bytes,
-                            struct grooms_prepared *prepared, struct groom_diag *diag)
+/* The groom says where it comes from: the job, and what that was given. What is prepared borrows from
+ * the job, so that both end here. */
+static groom_status take_result(struct request *request, const char *document, size_t n_bytes,
+                                struct groom_diag *diag)
 {
     struct store_job job = {0};
+    struct grooms_prepared prepared = {0};
     groom_status status = jobs_get(request->service->jobs, request->attempt.job_id, &job, diag);
     if (status != GROOM_OK)
         return status;
@@ -118,7 +120,10 @@ static groom_status prepare(struct request *request, const char *document, size_
         .head = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(inputs, "head")),
         .job = job.id,
         .note = job.kind};
-    status = grooms_prepare(request->service->grooms, document, n_bytes, &source, prepared, diag);
+    status = grooms_prepare(request->service->grooms, document, n_bytes, &source, &prepared, diag);
+    if (status == GROOM_OK)
+        status = work_result(request->service->jobs, &request->attempt, &prepared.revision, diag);
+    grooms_prepared_finish(&prepared);
     cJSON_Delete(inputs);
     store_job_finish(&job);
     return status;
@@ -127,7 +132,6 @@ static groom_status prepare(struct request *request, const char *document, size_
 void work_call_result(struct request *request)
 {
     struct groom_diag diag = {0};
-    struct grooms_prepared prepared = {0};
     size_t n_bytes = (size_t)request->n_received;
     if (n_bytes == 0) {
         respond_empty_body(request);
@@ -138,10 +142,7 @@ void work_call_result(struct request *request)
         respond_failure(request, GROOM_EIO, NULL);
         return;
     }
-    groom_status status = prepare(request, document, n_bytes, &prepared, &diag);
-    if (status == GROOM_OK)
-        status = work_result(request->service->jobs, &request->attempt, &prepared.revision, &diag);
-    grooms_prepared_finish(&prepared);
+    groom_status status = take_result(request, document, n_bytes, &diag);
     munmap(document, n_bytes);
     respond_done(request, status, &diag);
 }
