@@ -142,8 +142,8 @@ fuzz_objects = $(patsubst %.c,$(FUZZ_BUILD)/obj/%.o,$(1))
 $(FUZZ_BUILD)/obj/%.o: %.c
 	@mkdir -p $(@D)
 	clang $(FUZZ_FLAGS) -fsanitize=fuzzer-no-link $(INCLUDES) -MMD -MP -c $< -o $@
-$(FUZZ_BUILD)/fuzz_%: $(FUZZ_BUILD)/obj/tests/fuzz/fuzz_%.o $(call fuzz_objects,$(LIB_SOURCES))
-	clang $(FUZZ_FLAGS) -fsanitize=fuzzer -o $@ $^ $(LIBS_LIB) -pthread
+$(FUZZ_BUILD)/fuzz_%: $(FUZZ_BUILD)/obj/tests/fuzz/fuzz_%.o $(call fuzz_objects,$(LIB_SOURCES) $(PROTO_SOURCES))
+	clang $(FUZZ_FLAGS) -fsanitize=fuzzer -o $@ $^ $(LIBS_LIB) $(LIBS_SERVER) -pthread
 
 fuzz: setup
 	@$(SUBMAKE) $(addprefix $(FUZZ_BUILD)/fuzz_,$(FUZZERS))
@@ -154,9 +154,9 @@ fuzz: setup
 	done
 
 fuzz-corpus: $(addprefix $(BUILD)/tests/fuzz/replay_,$(FUZZERS))
-$(BUILD)/tests/fuzz/replay_%: $(BUILD)/obj/tests/fuzz/fuzz_%.o $(BUILD)/obj/tests/fuzz/replay.o $(LIBGROOM)
+$(BUILD)/tests/fuzz/replay_%: $(BUILD)/obj/tests/fuzz/fuzz_%.o $(BUILD)/obj/tests/fuzz/replay.o $(PROTO_A) $(LIBGROOM)
 	@mkdir -p $(@D)
-	$(CC) $(CFLAGS_ALL) -o $@ $(filter %.o,$^) $(LIBGROOM) $(LDFLAGS) $(LIBS_LIB)
+	$(CC) $(CFLAGS_ALL) -o $@ $(filter %.o,$^) $(PROTO_A) $(LIBGROOM) $(LDFLAGS) $(LIBS_LIB) $(LIBS_SERVER)
 
 # --- benchmarks, lint, run, install -------------------------------------------------
 
