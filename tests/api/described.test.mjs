@@ -1,0 +1,73 @@
+// Every operation that proto/openapi.yaml describes is called once in one sitting, and answers as
+// described; every route that groomd has is described.
+import test from 'node:test';
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { readFileSync } from 'node:fs';
+import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { events, expect, groom_document, head_obj, startIdleDaemon, submit, upload, strands_json } from '../support/api.mjs';
+import { operations, seen } from '../support/openapi.mjs';
+
+const here = dirname(fileURLToPath(import.meta.url));
+
+test('proto/openapi.json is made from proto/openapi.yaml', () => {
+  execFileSync(process.execPath, [join(here, '../support/openapi.mjs'), '--check']);
+});
+
+test('the table of routes and the description name the same calls', () => {
+  const text = readFileSync(join(here, '../../server/http/routes.c'), 'utf8');
+  const routes = [...text.matchAll(/^ {4}\{"([A-Z]+)", "([^"]+)".*?LANE_[A-Z]+, "([^"]*)"/gm)].map(([, method, path, query]) => ({ method, path, query }));
+  assert.deepEqual(routes.map(({ method, path }) => `${method} ${path}`).sort(), operations.map(({ method, path }) => `${method} ${path}`).sort());
+  for (const { method, path, query } of routes) {
+    const { operation } = operations.find((entry) => entry.method === method && entry.path === path);
+    const described = (operation.parameters ?? []).map((parameter) => parameter.$ref?.split('/').pop() ?? (parameter.in === 'query' ? parameter.name : ''))
+      .map((name) => (name === 'exportFormat' ? 'format' : name)).filter((name) => name && name !== 'ifMatch');
+    assert.deepEqual(query.split(' ').filter(Boolean).sort(), described.sort(), `query of ${method} ${path}`);
+  }
+});
+
+test('every operation answers as it is described', async (t) => {
+  const daemon = await startIdleDaemon(t);
+  const get = (path, status = 200, options) => expect(daemon, status, 'GET', path, options);
+  for (const path of ['/', '/status.css', '/healthz', '/readyz', '/metrics', '/openapi.json', '/v1/options', '/v1/strands', '/v1/heads', '/v1/jobs', '/v1/grooms'])
+    await get(path);
+
+  const strands = await upload(daemon);
+  const head = (await expect(daemon, 201, 'POST', '/v1/heads', { body: head_obj() })).json;
+  for (const [kind, { id }] of [['strands', strands], ['heads', head]]) {
+    await get(`/v1/${kind}/${id}`);
+    await get(`/v1/${kind}/${id}/data`);
+  }
+
+  const job = await submit(daemon, { head: head.id });
+  const token = await daemon.attempt();
+  const work = (status, method, path, options) => expect(daemon, status, method, `/v1/work/${path}`, { token, ...options });
+  const order = (await work(200, 'GET', 'job')).json;
+  await work(200, 'GET', `blobs/${order.inputs.head.sha256}`);
+  await work(200, 'POST', 'progress', { body: { stage: { name: 'initialize', index: 0, count: 5 }, progress: 0.1, losses: [{ iteration: 0, name: 'total', value: 1 }] } });
+  await work(204, 'PUT', 'checkpoint?stage=1', { body: 'state' });
+  await work(204, 'POST', 'result', { body: groom_document() });
+  const done = (await get(`/v1/jobs/${job.id}`, 200, { headers: { Prefer: 'wait=30' } })).json;
+  assert.ok((await events(daemon, `/v1/jobs/${job.id}/events`)).length > 3);
+  await get(`/v1/jobs/${job.id}/events?after=100000`, 204);
+  await get(`/v1/jobs/${job.id}/losses`);
+  const failing = await submit(daemon);
+  const second = await daemon.attempt();
+  await expect(daemon, 204, 'POST', '/v1/work/failed', { token: second, body: { type: '/problems/empty', title: 'nothing', status: 422, detail: 'no strand is left' } });
+  await expect(daemon, 200, 'DELETE', `/v1/jobs/${failing.id}`);
+
+  const groom = `/v1/grooms/${done.result.groom}`;
+  await get(groom);
+  await expect(daemon, 201, 'POST', '/v1/grooms', { body: groom_document() });
+  await expect(daemon, 201, 'PATCH', groom, { headers: { 'Content-Type': 'application/merge-patch+json', 'If-Match': '"1"' }, body: { name: 'other' } });
+  const guides = (await get(`${groom}/guides?format=json`)).json;
+  await expect(daemon, 201, 'PUT', `${groom}/guides`, { headers: { 'If-Match': '"2"' }, body: strands_json(guides.strands) });
+  await get(`${groom}/strands`);
+  await get(`${groom}/revisions`);
+  await expect(daemon, 201, 'POST', `${groom}/revert`, { headers: { 'If-Match': '"3"' }, body: { revision: 1 } });
+  await get(`${groom}/preview.png?size=64`);
+
+  const missing = operations.map(({ operation }) => operation.operationId).filter((id) => !seen.has(id));
+  assert.deepEqual(missing, [], 'operations that no call exercised');
+});
