@@ -4,10 +4,8 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "curvature/convert_strand.h"
-
-#define STRANDS_A_PIECE 64
+#include "curvature/pieces.h"
 
 struct groom_conversion_options groom_conversion_options_default(void)
 {
@@ -64,13 +62,6 @@ struct conversion_job {
     struct piece *pieces;
     int out_of_memory;                 /* any piece sets it; read after the loop */
 };
-
-static void piece_bounds(const struct conversion_job *job, uint32_t piece, uint32_t *begin, uint32_t *end)
-{
-    uint32_t n = job->strands->n_strands;
-    *begin = piece * STRANDS_A_PIECE;
-    *end = n - *begin < STRANDS_A_PIECE ? n : *begin + STRANDS_A_PIECE;
-}
 
 static uint32_t vertices_of(const struct groom_strands *strands, uint32_t i)
 {
@@ -146,7 +137,7 @@ static void convert_piece(void *user, uint32_t index, uint32_t thread)
     struct conversion_job *job = user;
     struct piece *p = &job->pieces[index];
     uint32_t begin, end;
-    piece_bounds(job, index, &begin, &end);
+    piece_bounds(job->strands->n_strands, index, &begin, &end);
     if (!piece_init(job, p, begin, end)) {
         __atomic_store_n(&job->out_of_memory, 1, __ATOMIC_RELAXED);
         return;
@@ -220,7 +211,7 @@ static int job_init(struct conversion_job *job, const struct groom_context *cont
     uint32_t n = job->strands->n_strands, longest = 2;
     for (uint32_t i = 0; i < n; i++)
         longest = vertices_of(job->strands, i) > longest ? vertices_of(job->strands, i) : longest;
-    job->n_pieces = n / STRANDS_A_PIECE + (n % STRANDS_A_PIECE != 0);
+    job->n_pieces = piece_count(n);
     job->n_spaces = parallel_threads(context);
     job->pieces = memory_array_zero(a, job->n_pieces, sizeof *job->pieces);
     job->spaces = memory_array_zero(a, job->n_spaces, sizeof *job->spaces);

@@ -1,10 +1,8 @@
 /* From super-helices to points: Eqs. 2-8 along each strand. */
 #include <math.h>
 
-#include "base/parallel.h"
 #include "curvature/chain.h"
-
-#define STRANDS_A_PIECE 64
+#include "curvature/pieces.h"
 
 /* Walks forward over the elements; steps back only where a station lies behind. */
 struct walker {
@@ -93,17 +91,16 @@ static void sample_strand(const struct sampling *job, uint32_t i)
 static void sample_piece(void *user, uint32_t piece, uint32_t thread)
 {
     const struct sampling *job = user;
-    uint32_t n = job->helices->n_strands, begin = piece * STRANDS_A_PIECE;
-    uint32_t end = n - begin < STRANDS_A_PIECE ? n : begin + STRANDS_A_PIECE;
+    uint32_t begin, end;
     (void)thread;
+    piece_bounds(job->helices->n_strands, piece, &begin, &end);
     for (uint32_t i = begin; i < end; i++)
         sample_strand(job, i);
 }
 
 static void sample_all(struct sampling *job, const struct groom_context *context)
 {
-    uint32_t n = job->helices->n_strands;
-    parallel_for(context, n / STRANDS_A_PIECE + (n % STRANDS_A_PIECE != 0), sample_piece, job);
+    parallel_for(context, piece_count(job->helices->n_strands), sample_piece, job);
 }
 
 groom_status groom_superhelices_sample(const struct groom_superhelices *helices, uint32_t n_vertices,

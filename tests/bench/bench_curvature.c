@@ -159,6 +159,35 @@ static void bench_sculpt(uint32_t n_elements)
     groom_superhelices_destroy(h);
 }
 
+static void bench_ruffle(const struct groom_context *context)
+{
+    enum { N = 100000 };
+    struct groom_superhelices *h = superhelix_coils(N, 90, 1, 0), *out;
+    struct groom_ruffle_options options = {.rho = 0.05, .match_elements = 30, .blend = 1.0, .seed = 1};
+    double best = 1e9;
+    for (int round = 0; round < 3; round++) {
+        double start = now();
+        need(groom_superhelices_ruffle(h, &options, context, &out, NULL));
+        best = now() - start < best ? now() - start : best;
+        groom_superhelices_destroy(out);
+    }
+    printf("figure ruffle_100k_seconds %.3f s 90 elements, rho 0.05\n", best);
+    groom_superhelices_destroy(h);
+}
+
+static void bench_analyze(const struct groom_context *context)
+{
+    enum { N = 20000 };
+    struct groom_superhelices *h = superhelix_coils(N, 45, 1, 0);
+    struct groom_analysis_options options = groom_analysis_options_default();
+    struct groom_analysis *analysis;
+    double start = now();
+    need(groom_superhelices_analyze(h, &options, context, &analysis, NULL));
+    printf("figure analyze_strands_per_s %.0f strands/s 45 elements\n", N / (now() - start));
+    groom_analysis_destroy(analysis);
+    groom_superhelices_destroy(h);
+}
+
 int main(void)
 {
     struct groom_pool *pool;
@@ -166,6 +195,8 @@ int main(void)
     struct groom_context context = {.pool = pool};
     bench_convert(&context);
     bench_sample(&context);
+    bench_analyze(&context);
+    bench_ruffle(&context);
     bench_sculpt(45);
     bench_sculpt(90);
     groom_pool_destroy(pool);

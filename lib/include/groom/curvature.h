@@ -191,6 +191,152 @@ GROOM_MUST_CHECK groom_status groom_superhelices_sculpt(struct groom_superhelice
                                                         struct groom_sculpt_outcome *outcomes,
                                                         struct groom_diag *diag);
 
+/* --- analysis (Section 4) --------------------------------------------------------- */
+
+struct groom_analysis_options {
+    uint32_t n_samples;     /* of each centre curve, uniform in arc length; 3 or more */
+    uint32_t n_bins;        /* Fourier bins of the segment vectors that it keeps, the constant one counted; 1..8 */
+    double straight_below;  /* turns per metre of arc under which hair is straight */
+    double wavy_below;      /* |beta| under which it winds in a plane, not round an axis */
+    double switchback_turn; /* radians of winding on either side that make a change of handedness one */
+};
+
+/* 65 samples, 3 bins, 5 turns per metre, |beta| 0.5, half a turn. */
+struct groom_analysis_options groom_analysis_options_default(void);
+
+typedef enum groom_hair_kind { GROOM_HAIR_STRAIGHT = 0, GROOM_HAIR_WAVY, GROOM_HAIR_COILED } groom_hair_kind;
+
+/* One element as a helix (Eqs. 12-14; the paper's omega is radians per metre of axis). */
+struct groom_element_shape {
+    float radius_m;    /* kappa / |Omega|^2; 0 where straight */
+    float step_m;      /* rise of a turn, signed: 2 pi tau / |Omega|^2; 0 where |Omega| is 0 */
+    float frequency;   /* turns per metre of arc: |Omega| / 2 pi */
+    float omega;       /* |Omega|^2 / tau, signed; INFINITY where there is no torsion */
+    float beta;        /* at the element's middle: c'/|c'| . Omega/|Omega|; 0 where |Omega| is 0 */
+    int8_t hand;       /* sign of the torsion: 1 right, -1 left, 0 none */
+    uint8_t kind;      /* groom_hair_kind */
+};
+
+/* Where a strand changes handedness: winding goes on by switchback_turn on both sides. */
+struct groom_switchback {
+    uint32_t strand, element; /* the first element of the new hand */
+    float at;                 /* 0..1 of the strand's arc length, where that element begins */
+};
+
+#define GROOM_HISTOGRAM_BINS 32
+struct groom_histogram {
+    double low, high;                    /* of the whole; what lies above is in the last bin */
+    double weight[GROOM_HISTOGRAM_BINS]; /* metres of hair, or strands; see below */
+};
+
+struct groom_analysis {
+    uint32_t n_strands, n_elements, n_samples, n_switchbacks;
+    uint32_t *first;                      /* [n_strands + 1] as in the super-helices */
+    struct groom_element_shape *elements; /* [n_elements] */
+    float (*centre)[3];                   /* [n_strands][n_samples] centre curves */
+    float *turns;                         /* [n_strands] sum of |Omega| l / 2 pi */
+    struct groom_switchback *switchbacks; /* [n_switchbacks], strand by strand */
+    struct {
+        double length_m;                  /* of all strands */
+        double share[3];                  /* of that length, by groom_hair_kind */
+        double radius_mean_m;             /* over coiled and wavy length */
+        struct groom_histogram radius;    /* metres; weight: coiled and wavy length */
+        struct groom_histogram turns;     /* turns of a strand; weight: strands */
+    } summary;
+    const struct groom_allocator *allocator;
+};
+
+/* returns  GROOM_OK, GROOM_EINVAL (options), GROOM_ENOMEM
+ * threads  deterministic for any pool */
+GROOM_MUST_CHECK groom_status groom_superhelices_analyze(const struct groom_superhelices *helices,
+                                                         const struct groom_analysis_options *options,
+                                                         const struct groom_context *context,
+                                                         struct groom_analysis **analysis,
+                                                         struct groom_diag *diag);
+void groom_analysis_destroy(struct groom_analysis *analysis); /* takes NULL */
+
+/* The element under each of a strand's stations, for colouring vertices: element indices into
+ * analysis->elements.
+ * first, at, out  as in groom_superhelices_sample_at */
+void groom_superhelices_elements_at(const struct groom_superhelices *helices, const uint32_t *first,
+                                    const float *at, uint32_t *out, const struct groom_context *context);
+
+/* --- edits (Section 4.3) -------------------------------------------------------------- */
+
+/* Another k in Eq. 9 turns (kappa_1, kappa_2) of a whole strand without changing its curve. Before
+ * strands are mixed their gauges must agree: the angle by which b's curvatures must be turned to lie
+ * nearest a's (least squares over both lengths). */
+double groom_superhelix_gauge(const struct groom_superhelices *a, uint32_t strand_a,
+                              const struct groom_superhelices *b, uint32_t strand_b);
+/* Turn a strand's gauge: frame and curvatures, not the curve. */
+void groom_superhelix_turn_gauge(struct groom_superhelices *helices, uint32_t strand, double angle);
+
+struct groom_ruffle_options {
+    double rho;              /* 0..1: chance of an element to be replaced */
+    uint32_t match_elements; /* so many from the root stay: what is changed there swings the whole strand */
+    double blend;            /* 0..1: how far from the strand's own to the replaced curvature */
+    uint64_t seed;
+    uint32_t stream;         /* the use: another operator of the chain draws other numbers */
+    const uint32_t *group;   /* [n_strands] below n_groups: elements come from the same group; NULL: all are one */
+    uint32_t n_groups;
+};
+
+/* Ruffling (4.3.1): each element past the first few is replaced, with chance rho, by the element of the
+ * same index of a strand drawn from its group (its length with it), gauges aligned. What a strand draws
+ * depends on seed, stream and its index alone.
+ * returns  GROOM_OK, GROOM_EINVAL (diag points to /rho, /blend or /groups), GROOM_ENOMEM
+ * threads  deterministic for any pool */
+GROOM_MUST_CHECK groom_status groom_superhelices_ruffle(const struct groom_superhelices *helices,
+                                                        const struct groom_ruffle_options *options,
+                                                        const struct groom_context *context,
+                                                        struct groom_superhelices **ruffled,
+                                                        struct groom_diag *diag);
+
+/* For each strand of a, the strand of b whose root is nearest (ties: the lower index).
+ * partner  [a->n_strands], the caller's
+ * returns  GROOM_OK, GROOM_EEMPTY (b has no strands), GROOM_ENOMEM */
+GROOM_MUST_CHECK groom_status groom_superhelices_match_roots(const struct groom_superhelices *a,
+                                                             const struct groom_superhelices *b,
+                                                             const struct groom_context *context,
+                                                             uint32_t *partner, struct groom_diag *diag);
+
+/* Strands between those of a (t = 0) and their partners in b (t = 1): roots on a line, frames by the
+ * shortest turn, lengths and curvatures linearly, gauges aligned. Where the two divide a strand
+ * differently, the result has the breaks of both, so that either end is exact.
+ * partner  [a->n_strands] strands of b; NULL: the same index
+ * returns  GROOM_OK, GROOM_EINVAL (t outside 0..1 or a partner that is not there), GROOM_ENOMEM */
+GROOM_MUST_CHECK groom_status groom_superhelices_interpolate(const struct groom_superhelices *a,
+                                                             const struct groom_superhelices *b,
+                                                             const uint32_t *partner, double t,
+                                                             const struct groom_context *context,
+                                                             struct groom_superhelices **between,
+                                                             struct groom_diag *diag);
+
+typedef enum groom_curl_keep {
+    GROOM_CURL_KEEP_LENGTH = 0, /* the number of turns changes */
+    GROOM_CURL_KEEP_TURNS       /* the length changes */
+} groom_curl_keep;
+
+struct groom_curl_scale_options {
+    double radius, step;     /* factors, above 0: of each helix's radius and of its rise a turn */
+    groom_curl_keep keep;
+    double ramp[2];          /* 0..1 how much of the change at root and tip: {1, 1} is all of it everywhere */
+    const float *weight;     /* [n_strands] 0..1 of each strand's share of the change, or NULL: all of it */
+    double largest_radius_m; /* bends wider than this are not curls and stay; 0: all are */
+    int hold_direction;      /* turn each strand about its root so that its tip lies where it lay, as seen from there */
+};
+
+/* Factors of 1, length kept, no ramp, direction held. */
+struct groom_curl_scale_options groom_curl_scale_options_default(void);
+
+/* Expand or shrink curls in place.
+ * returns  GROOM_OK, GROOM_EINVAL (diag points to /radius, /step, /ramp or /weight); untouched on error
+ * threads  deterministic for any pool */
+GROOM_MUST_CHECK groom_status groom_superhelices_scale_curls(struct groom_superhelices *helices,
+                                                             const struct groom_curl_scale_options *options,
+                                                             const struct groom_context *context,
+                                                             struct groom_diag *diag);
+
 #ifdef __cplusplus
 }
 #endif
