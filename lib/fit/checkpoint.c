@@ -233,9 +233,9 @@ static int sound_state(const struct groom_fit *fit)
         return 0;
     if (fit->groom && !sound_groom(fit))
         return 0;
-    if (fit->stage > 0)
-        return fit->groom && groom_validate(fit->groom, NULL) == GROOM_OK;
-    return initialize_sound(fit);
+    if (fit->stage > 0 && !(fit->groom && groom_validate(fit->groom, NULL) == GROOM_OK && fit->n_guides > 0))
+        return 0;
+    return fit->stage == FIT_N_STAGES || fit_stages[fit->stage].sound(fit);
 }
 
 /* What can be in a checkpoint of this fit at most. */

@@ -58,6 +58,8 @@ groom_status groom_fit_create(const struct groom_strands *strands, const struct 
         goto out;
     if ((st = checksum_inputs(fit, strands, head, diag)) != GROOM_OK)
         goto out;
+    if (fit->options.n_cameras > 0)
+        report_note(&fit->report, "Cameras were read; the stages of this version use all strands, seen or not.");
     *out = fit;
     fit = NULL;
 out:

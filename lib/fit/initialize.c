@@ -22,7 +22,6 @@ enum phase { SEED, CLUSTER, GUIDES, OPERATOR_GUIDES, INSTANCE, OPERATORS, ASSIGN
 
 #define FEATURE_VERTICES 16        /* of a strand, where seeds are drawn */
 #define STEP_PRODUCTS 3e10         /* multiplications of K-means in a step: about half a second on two cores */
-#define STEP_STRANDS 20000         /* assigned in a step */
 #define LEAST_CLUSTER 4            /* strands a guide, where the number of guides is automatic */
 #define GUIDES_PER_ROOT 4.0        /* guides for each square root of the number of strands */
 
@@ -279,43 +278,6 @@ static groom_status make_operators(struct groom_fit *fit, const struct groom_con
     return st;
 }
 
-/* --- assignment ---------------------------------------------------------------------------- */
-
-/* The strongest clump of the chain: what pulls strands across. 0: nothing does. */
-static float clump_profile(const struct groom *groom)
-{
-    float profile = 0;
-    for (uint32_t i = 0; i < groom->n_operators; i++)
-        if (groom->operators[i].type == GROOM_OPERATOR_CLUMP)
-            profile = fmaxf(profile, fmaxf(groom->operators[i].parameter[0], 1));
-    return profile;
-}
-
-static groom_status assign(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
-{
-    float profile = clump_profile(fit->groom);
-    float clearance = (float)fit->options.stages.initialize.head_clearance * fit->ordinary;
-    uint32_t first = fit->iteration, count = least(fit->n - first, STEP_STRANDS);
-    struct assign_counts counts = {0};
-
-    if (fit->bvh && profile > 0) {
-        groom_status st = assign_out_of_head(fit->groom, fit->bvh, profile, clearance, first, count, context, &counts, diag);
-        if (st != GROOM_OK)
-            return st;
-        fit->report.n_reassigned += counts.n_reassigned;
-        fit->report.n_penetrating += counts.n_penetrating;
-        fit->iteration += count;
-        if (fit->iteration < fit->n)
-            return GROOM_OK;
-    }
-    if (groom_validate(fit->groom, diag) != GROOM_OK)
-        return groom_fail(diag, GROOM_EINTERNAL, "stage initialize made a groom that is none");
-    if (fit->options.n_cameras > 0)
-        report_note(&fit->report, "Cameras were read; stage initialize uses all strands, seen or not.");
-    fit->phase = ENDED;
-    return GROOM_OK;
-}
-
 groom_status initialize_step(struct groom_fit *fit, int *ended, const struct groom_context *context,
                              struct groom_diag *diag)
 {
@@ -327,10 +289,9 @@ groom_status initialize_step(struct groom_fit *fit, int *ended, const struct gro
     case OPERATOR_GUIDES: st = choose_operator_guides(fit, context, diag); break;
     case INSTANCE: st = instance(fit, context, diag); break;
     case OPERATORS: st = make_operators(fit, context, diag); break;
-    case ASSIGN: st = assign(fit, context, diag); break;
+    case ASSIGN: st = assign_step(fit, ended, context, diag); break;
     case ENDED: break;
     }
-    *ended = st == GROOM_OK && fit->phase == ENDED;
     return st;
 }
 

@@ -49,8 +49,14 @@ const struct option_row options_table[] = {
         "Start operators from estimates off the strands; else from their documented initial values."),
 
     {"/stages/instance_weights", OPTION_GROUP, 0, ALL(0), 0, 0, "Instancing weights of each strand (Section 5.3)."},
-    ROW(instance_weights, iterations, OPTION_U32, 2000, 2000, 2000, 0, 1000000, "Gradient steps of the paper's method."),
-    ROW(instance_weights, learning_rate, OPTION_REAL, 30, 30, 30, 0, 1e6, "Learning rate of the paper's method."),
+    ROW(instance_weights, candidates, OPTION_U32, 12, 12, 12, 1, 32,
+        "Guides near a strand among which it chooses the interpolation_guides that it blends."),
+    ROW(instance_weights, distance_pull, OPTION_REAL, 0.01, 0.01, 0.01, 1e-9, 1e6,
+        "Pull towards the weights by distance, relative to the strand's own size."),
+    ROW(instance_weights, iterations, OPTION_U32, 2000, 2000, 2000, 0, 1000000,
+        "Gradient steps of the paper's method; the closed form that is used needs none."),
+    ROW(instance_weights, learning_rate, OPTION_REAL, 30, 30, 30, 0, 1e6,
+        "Learning rate of the paper's method; the closed form that is used needs none."),
 
     {"/stages/guides", OPTION_GROUP, 0, ALL(0), 0, 0, "The shape of the guides (Section 5.4)."},
     ROW(guides, iterations, OPTION_U32, 3000, 3000, 3000, 0, 1000000, "Gradient steps."),

@@ -40,12 +40,17 @@ struct fit_stage {
     groom_status (*step)(struct groom_fit *fit, int *ended, const struct groom_context *context,
                          struct groom_diag *diag);
     double (*fraction)(const struct groom_fit *fit); /* 0..1 of the stage */
-    double weight;                                   /* its share of the time of a fit */
+    /* Whether phase and iteration go with what else the state holds: for one that was read. */
+    int (*sound)(const struct groom_fit *fit);
+    double weight; /* its share of the time of a fit */
 };
 
 /* The stages of this library, in order: X(name, its share of the time of a fit). Each has a file
- * <name>.c with <name>_step and <name>_fraction. A new stage is one line here and that file. */
-#define FIT_STAGE_LIST(X) X(initialize, 1.0)
+ * <name>.c with <name>_step, <name>_fraction and <name>_sound. A new stage is one line here and that
+ * file. */
+#define FIT_STAGE_LIST(X)                                                                                    \
+    X(initialize, 1.0)                                                                                       \
+    X(instance_weights, 0.3)
 
 enum {
 #define FIT_STAGE_INDEX(name, weight) FIT_STAGE_##name,
@@ -57,12 +62,18 @@ enum {
 extern const struct fit_stage fit_stages[FIT_N_STAGES];
 int fit_has_stage(const char *name);
 
-/* stage `initialize` */
-groom_status initialize_step(struct groom_fit *fit, int *ended, const struct groom_context *context,
-                             struct groom_diag *diag);
-double initialize_fraction(const struct groom_fit *fit);
-/* Whether phase and iteration go with what else the state holds: for one that was read. */
-int initialize_sound(const struct groom_fit *fit);
+#define FIT_STAGE_DECLARE(name, weight)                                                                      \
+    groom_status name##_step(struct groom_fit *fit, int *ended, const struct groom_context *context,          \
+                             struct groom_diag *diag);                                                        \
+    double name##_fraction(const struct groom_fit *fit);                                                      \
+    int name##_sound(const struct groom_fit *fit);
+FIT_STAGE_LIST(FIT_STAGE_DECLARE)
+#undef FIT_STAGE_DECLARE
+
+/* The last phase of stages that move strands: operator guides for the next strands from `iteration`
+ * on, out of the head; *ended with the last ones (assign_step.c). */
+groom_status assign_step(struct groom_fit *fit, int *ended, const struct groom_context *context,
+                         struct groom_diag *diag);
 
 /* Fills n .. ordinary, and the report's counts of joined and detached strands. */
 groom_status target_create(struct groom_fit *fit, const struct groom_strands *strands,

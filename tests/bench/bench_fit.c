@@ -33,26 +33,38 @@ static struct groom_sample *capture_of(uint32_t n_strands, const struct groom_co
     return sample;
 }
 
-/* Runs stage 0 and returns its seconds; the time of its longest step in *longest. */
-static double initialize(const struct groom_sample *sample, const struct groom_fit_options *options,
-                         const struct groom_context *context, double *longest)
+#define MAX_STAGES 8
+
+struct times { double stage[MAX_STAGES], longest; };
+
+/* Seconds of each stage (making the target counts to the first) and of the longest step. */
+static struct times time_stages(const struct groom_sample *sample, const struct groom_fit_options *options,
+                                const struct groom_context *context)
 {
+    struct times times = {0};
     struct groom_fit *fit;
-    struct groom_fit_progress progress = {0};
     struct groom_diag diag = {0};
     double begin = now();
     check(groom_fit_create(sample->capture, sample->head, options, context, &fit, &diag), &diag);
-    *longest = now() - begin;
-    while (!groom_fit_done(fit) && progress.index == 0) {
-        double step = now();
-        check(groom_fit_step(fit, context, &diag), &diag);
-        step = now() - step;
-        *longest = step > *longest ? step : *longest;
+    times.stage[0] = times.longest = now() - begin;
+    while (!groom_fit_done(fit)) {
+        struct groom_fit_progress progress;
         groom_fit_progress(fit, &progress);
+        begin = now();
+        check(groom_fit_step(fit, context, &diag), &diag);
+        double seconds = now() - begin;
+        times.stage[progress.index % MAX_STAGES] += seconds;
+        times.longest = seconds > times.longest ? seconds : times.longest;
     }
-    double seconds = now() - begin;
     groom_fit_destroy(fit);
-    return seconds;
+    return times;
+}
+
+static void print_stages(const struct times *times, const char *size, const char *words)
+{
+    for (uint32_t s = 0; groom_fit_stage_name(s) && s < MAX_STAGES; s++)
+        printf("figure %s_%s_seconds %.3f s %s\n", groom_fit_stage_name(s), size, times->stage[s], words);
+    printf("figure longest_step_%s_seconds %.3f s what a crash can lose of it\n", size, times->longest);
 }
 
 int main(void)
@@ -60,7 +72,6 @@ int main(void)
     struct groom_pool *pool;
     struct groom_context context = {0};
     struct groom_fit_options options;
-    double longest;
     if (groom_pool_create(0, &pool) != GROOM_OK)
         return 1;
     context.pool = pool;
@@ -71,16 +82,15 @@ int main(void)
     double begin = now();
     struct groom_sample *sample = capture_of(30000, &context);
     printf("figure sample_30k_seconds %.3f s generator: 30 000 strands x 100\n", now() - begin);
-    printf("figure initialize_30k_seconds %.3f s stage initialize: 30 000 strands x 100, 1 000 guides, 250 operator guides\n",
-           initialize(sample, &options, &context, &longest));
-    printf("figure initialize_30k_longest_step_seconds %.3f s longest step of it, between two checkpoints\n", longest);
+    struct times times = time_stages(sample, &options, &context);
+    print_stages(&times, "30k", "30 000 strands x 100, 1 000 guides, 250 operator guides");
     groom_sample_destroy(sample);
 
     sample = capture_of(100000, &context);
     options.guides = 500;
     options.operator_guides = 125;
-    printf("figure initialize_100k_seconds %.3f s stage initialize: 100 000 strands x 100, 500 guides, 125 operator guides\n",
-           initialize(sample, &options, &context, &longest));
+    times = time_stages(sample, &options, &context);
+    print_stages(&times, "100k", "100 000 strands x 100, 500 guides, 125 operator guides");
     groom_sample_destroy(sample);
     groom_pool_destroy(pool);
     return 0;

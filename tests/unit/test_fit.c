@@ -159,8 +159,10 @@ START_TEST(the_report_counts_and_prints)
     const struct groom_fit_report *report = groom_fit_get_report(fit);
     ck_assert_uint_eq(report->n_guides, 40);
     ck_assert_uint_gt(report->n_joined, 100);
-    ck_assert_uint_eq(report->n_losses, 2);
+    ck_assert_uint_eq(report->n_losses, 3);
     ck_assert_str_eq(report->losses[0].name, "cluster");
+    ck_assert_str_eq(report->losses[2].name, "L_x");
+    ck_assert_double_lt(report->losses[2].after, report->losses[2].before);
     ck_assert_double_lt(report->losses[0].after, report->losses[0].before);
     ck_assert_double_le(report->losses[1].after, report->losses[1].before);
     ck_ok(groom_fit_report_print(fit, &json, NULL));
@@ -577,6 +579,80 @@ START_TEST(guides_are_smoothed_means_of_their_clusters)
 }
 END_TEST
 
+/* --- instance_weights ------------------------------------------------------------------------- */
+
+/* Eq. 5, by brute force, of the guides' clusters' means as they are instanced. */
+static double brute_loss(const struct groom_fit *fit)
+{
+    const struct groom *groom = fit->groom;
+    double sum = 0;
+    for (uint32_t i = 0; i < fit->n; i++)
+        for (uint32_t j = 0; j < fit->m; j++)
+            for (int c = 0; c < 3; c++) {
+                double x = 0;
+                for (uint32_t s = 0; s < groom->n_instancing; s++) {
+                    const float (*mean)[3] =
+                        (const float (*)[3])(fit->centroids + (size_t)groom->instancing_guide[i * groom->n_instancing + s] * fit->m);
+                    x += groom->instancing_weight[i * groom->n_instancing + s] * ((double)mean[j][c] - mean[0][c]);
+                }
+                x -= (double)fit->target[(size_t)i * fit->m + j][c] - fit->target[(size_t)i * fit->m][c];
+                sum += x * x;
+            }
+    return sum * fit->scale * fit->scale / ((double)fit->n * fit->m);
+}
+
+START_TEST(instance_weights_report_the_papers_loss_and_lower_it)
+{
+    struct groom_sample *sample = sample_of(GROOM_SAMPLE_STRAIGHT, 500, 0);
+    struct groom_fit_options options = options_of(50, 12, 24);
+    struct groom_fit *fit = fit_of(sample->capture, sample->head, &options, NULL);
+    while (fit->stage == 0)
+        ck_ok(groom_fit_step(fit, NULL, NULL));
+    double before = brute_loss(fit);
+    run(fit, NULL);
+    const struct groom_fit_loss *loss = &fit->report.losses[fit->report.n_losses - 1];
+    ck_assert_double_eq_tol(loss->before, before, 1e-5 * before);
+    ck_assert_double_eq_tol(loss->after, brute_loss(fit), 1e-5 * before);
+    ck_assert_double_lt(loss->after, 0.5 * loss->before);
+    for (uint32_t i = 0; i < fit->n; i++) {
+        float sum = 0;
+        for (uint32_t s = 0; s < 3; s++) {
+            float weight = fit->groom->instancing_weight[3 * i + s];
+            ck_assert(weight >= 0 && weight <= 1.00001f);
+            sum += weight;
+            for (uint32_t t = 0; t < s; t++)
+                ck_assert_uint_ne(fit->groom->instancing_guide[3 * i + s], fit->groom->instancing_guide[3 * i + t]);
+        }
+        ck_assert_float_eq_tol(sum, 1, 1e-5f);
+    }
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
+START_TEST(a_strong_pull_keeps_the_weights_by_distance)
+{
+    struct groom_sample *sample = sample_of(GROOM_SAMPLE_CURLY, 200, 0);
+    struct groom_fit_options options = options_of(20, 5, 24);
+    options.stages.instance_weights.distance_pull = 1e6;
+    struct groom_fit *fit = fit_of(sample->capture, sample->head, &options, NULL);
+    while (fit->stage == 0)
+        ck_ok(groom_fit_step(fit, NULL, NULL));
+    struct groom *before = fit->groom, *after;
+    ck_ok(groom_clone(fit->groom, NULL, &before, NULL));
+    run(fit, NULL);
+    after = fit->groom;
+    for (uint32_t i = 0; i < fit->n; i++)
+        for (uint32_t s = 0; s < 3; s++)
+            for (uint32_t t = 0; t < 3; t++)
+                if (before->instancing_guide[3 * i + s] == after->instancing_guide[3 * i + t])
+                    ck_assert_float_eq_tol(before->instancing_weight[3 * i + s], after->instancing_weight[3 * i + t], 1e-4f);
+    groom_destroy(before);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
 /* --- assignment ------------------------------------------------------------------------------- */
 
 START_TEST(buried_vertices_are_those_deep_inside)
@@ -645,4 +721,5 @@ TEST_SUITE("fit", a_fit_goes_through_its_stages_and_ends, the_report_counts_and_
            what_cannot_be_fitted_is_refused, few_strands_make_a_groom, strands_all_alike_make_one_guide,
            strands_without_length_or_from_one_root_are_survived, no_operators_and_operators_by_table_values,
            the_unit_changes_nothing_but_the_size, roots_lie_on_the_scalp, guides_are_smoothed_means_of_their_clusters,
+           instance_weights_report_the_papers_loss_and_lower_it, a_strong_pull_keeps_the_weights_by_distance,
            buried_vertices_are_those_deep_inside, a_strand_leaves_the_operator_guide_that_pulls_it_into_the_head)

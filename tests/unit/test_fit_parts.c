@@ -5,6 +5,7 @@
 
 #include "fit/kmeans.h"
 #include "fit/medoids.h"
+#include "fit/simplex.h"
 #include "fit/smooth.h"
 #include "groom/random.h"
 #include "tests/support/test.h"
@@ -359,6 +360,112 @@ START_TEST(medoids_survive_each_failing_allocation)
 }
 END_TEST
 
+/* --- weights that sum to 1 ------------------------------------------------------------ */
+
+/* A random problem: n columns of 9 numbers, a target near some blend of them. */
+static void problem(uint32_t index, uint32_t n, double *gram, double *b)
+{
+    struct groom_random_key draw = {77, index};
+    double column[8][9], target[9] = {0};
+    for (uint32_t i = 0; i < n; i++)
+        for (uint32_t c = 0; c < 9; c++) {
+            column[i][c] = groom_random_normal(draw, i, c);
+            target[c] += column[i][c] * (groom_random_uniform(draw, i, 20) - 0.3);
+        }
+    for (uint32_t i = 0; i < n; i++) {
+        b[i] = 0;
+        for (uint32_t c = 0; c < 9; c++)
+            b[i] += column[i][c] * target[c];
+        for (uint32_t j = 0; j < n; j++) {
+            gram[i * n + j] = 0;
+            for (uint32_t c = 0; c < 9; c++)
+                gram[i * n + j] += column[i][c] * column[j][c];
+        }
+    }
+}
+
+static double value_of(const double *gram, const double *b, uint32_t n, const double *w)
+{
+    double value = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        value -= 2 * b[i] * w[i];
+        for (uint32_t j = 0; j < n; j++)
+            value += w[i] * gram[i * n + j] * w[j];
+    }
+    return value;
+}
+
+START_TEST(simplex_weights_are_the_minimum_on_a_fine_grid)
+{
+    for (uint32_t index = 0; index < 60; index++) {
+        double gram[9], b[3], w[3], least = INFINITY;
+        problem(index, 3, gram, b);
+        simplex_solve(gram, b, 3, 3, w);
+        for (int i = 0; i <= 100; i++)
+            for (int j = 0; i + j <= 100; j++)
+                least = fmin(least, value_of(gram, b, 3, (double[3]){i / 100., j / 100., (100 - i - j) / 100.}));
+        ck_assert_double_le(value_of(gram, b, 3, w), least + 1e-9);
+        ck_assert_double_ge(fmin(w[0], fmin(w[1], w[2])), 0);
+        ck_assert_double_eq_tol(w[0] + w[1] + w[2], 1, 1e-9);
+    }
+}
+END_TEST
+
+/* Where no weight may grow at another's cost, the (convex) problem is solved. */
+START_TEST(no_exchange_between_simplex_weights_is_an_improvement)
+{
+    for (uint32_t index = 0; index < 300; index++) {
+        double gram[64], b[8], w[8], sum = 0;
+        problem(index, 8, gram, b);
+        simplex_solve(gram, b, 8, 8, w);
+        double reached = value_of(gram, b, 8, w);
+        for (int i = 0; i < 8; i++) {
+            ck_assert_double_ge(w[i], 0);
+            sum += w[i];
+            for (int j = 0; j < 8; j++) {
+                double step = fmin(w[j], 1e-4);
+                w[i] += step;
+                w[j] -= step;
+                ck_assert_double_ge(value_of(gram, b, 8, w), reached - 1e-9);
+                w[i] -= step;
+                w[j] += step;
+            }
+        }
+        ck_assert_double_eq_tol(sum, 1, 1e-9);
+    }
+}
+END_TEST
+
+START_TEST(a_limited_support_is_kept_and_better_than_one)
+{
+    for (uint32_t index = 0; index < 100; index++) {
+        double gram[64], b[8], w[8], one[8];
+        uint32_t n_above = 0;
+        problem(index, 8, gram, b);
+        simplex_solve(gram, b, 8, 3, w);
+        simplex_solve(gram, b, 8, 1, one);
+        for (int i = 0; i < 8; i++)
+            n_above += w[i] > 0;
+        ck_assert_uint_le(n_above, 3);
+        ck_assert_double_le(value_of(gram, b, 8, w), value_of(gram, b, 8, one) + 1e-12);
+    }
+}
+END_TEST
+
+START_TEST(columns_that_are_alike_are_survived)
+{
+    double gram[16], b[4], w[4], sum = 0;
+    for (int i = 0; i < 16; i++)
+        gram[i] = 2;
+    for (int i = 0; i < 4; i++)
+        b[i] = 1;
+    simplex_solve(gram, b, 4, 4, w);
+    for (int i = 0; i < 4; i++)
+        sum += w[i];
+    ck_assert_double_eq_tol(sum, 1, 1e-9);
+}
+END_TEST
+
 TEST_SUITE("fit_parts", seeds_are_different_rows_and_cover_separate_blobs, seeding_stops_where_no_place_is_left,
            an_iteration_is_nearest_centre_then_mean,
            the_objective_never_increases_and_no_cluster_is_empty,
@@ -366,4 +473,6 @@ TEST_SUITE("fit_parts", seeds_are_different_rows_and_cover_separate_blobs, seedi
            smoothing_is_the_steps_of_the_heat_equation, smoothing_keeps_the_root_and_the_tip_to_the_bit,
            smoothing_without_end_is_a_straight_line, smoothing_nothing_free_changes_nothing,
            medoids_are_different_members_in_order, no_single_swap_improves_medoids, one_medoid_is_the_best_one,
-           all_rows_or_rows_at_one_place_may_be_medoids, medoids_survive_each_failing_allocation)
+           all_rows_or_rows_at_one_place_may_be_medoids, medoids_survive_each_failing_allocation,
+           simplex_weights_are_the_minimum_on_a_fine_grid, no_exchange_between_simplex_weights_is_an_improvement,
+           a_limited_support_is_kept_and_better_than_one, columns_that_are_alike_are_survived)

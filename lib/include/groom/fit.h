@@ -68,6 +68,8 @@ struct groom_fit_options {
             int estimate_operators;
         } initialize;
         struct {
+            uint32_t candidates;        /* guides near a strand among which it chooses */
+            double distance_pull;       /* towards the weights by distance */
             uint32_t iterations;        /* Section 6: 2000 */
             double learning_rate;       /* 30 */
         } instance_weights;
