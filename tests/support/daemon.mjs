@@ -131,6 +131,9 @@ export async function startDaemon(t, { args = [], env = {} } = {}) {
     try {
       daemon.check_logs();
       if (code !== 0 && signal !== 'SIGKILL') throw new Error(`groomd ended with ${code ?? signal}:\n${daemon.log().slice(-3000)}`);
+    } catch (error) {
+      t.diagnostic(error.message); // node shows a test's first failure alone
+      throw error;
     } finally {
       rmSync(folder, { recursive: true, force: true });
     }
