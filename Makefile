@@ -20,7 +20,7 @@ FUZZ_SECONDS ?= 60
 SUBMAKE = $(MAKE) --no-print-directory $(if $(findstring -j,$(MAKEFLAGS)),,-j$(shell nproc))
 
 WARNINGS = -Wall -Wextra -Werror -Wshadow -Wpointer-arith -Wstrict-prototypes -Wmissing-prototypes \
-           -Wvla -Wwrite-strings -Wformat=2 -Wno-unused-parameter
+           -Wvla -Wwrite-strings -Wformat=2 -Wno-unused-parameter -Wno-psabi
 FLAGS_release = -O3 -g -fno-math-errno
 FLAGS_asan    = -O1 -g -fno-math-errno -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer
 FLAGS_tsan    = -O1 -g -fno-math-errno -fsanitize=thread -fno-omit-frame-pointer

@@ -146,7 +146,7 @@ START_TEST(a_fit_with_the_given_count_meets_the_vectors)
     ck_ok(groom_strands_create(1, n, NULL, &strands, NULL));
     strands->first[1] = n;
     for (uint32_t k = 0; k < n * 3; k++)
-        strands->points[0][k] = (float)points[0][k];
+        strands->points[k / 3][k % 3] = (float)points[k / 3][k % 3];
     struct groom_conversion_options options = {.n_elements = 12};
     struct groom_conversion *c;
     ck_ok(groom_strands_convert(strands, &options, NULL, &c, NULL));
