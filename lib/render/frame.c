@@ -117,7 +117,7 @@ static void place_lights(struct render_scene *scene, const struct axes *axes)
 /* A full head has about 100 000 hairs of 0.08 mm; fewer strands are drawn wider, each for several. */
 static float hair_width(const struct render_scene *scene, const struct box *hair)
 {
-    double full = box_diagonal(hair), n = scene->strands->n_strands;
+    double full = box_diagonal(hair), n = (double)scene->strands->n_strands / scene->stride;
     double width = 0.00022 * full * sqrt(fmax(1, 60000 / n));
     return (float)fmin(width, full / 150);
 }
@@ -140,6 +140,11 @@ groom_status render_frame(struct render_scene *scene, groom_view view, struct gr
     place_lights(scene, fit.axes);
     memcpy(scene->hair_min, hair.low, sizeof hair.low);
     memcpy(scene->hair_max, hair.high, sizeof hair.high);
+    /* fit_point has left every point in front of the camera; the corner of the box nearest to it too */
+    double reach = 0;
+    for (int k = 0; k < 3; k++)
+        reach += fmax((hair.low[k] - fit.centre[k]) * fit.axes->back[k], (hair.high[k] - fit.centre[k]) * fit.axes->back[k]);
+    scene->nearest = (float)fmax(fit.distance - reach, 1e-3 * fit.distance);
     if (!(scene->width > 0))
         scene->width = hair_width(scene, &hair);
     return GROOM_OK;

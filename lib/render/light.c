@@ -65,7 +65,8 @@ static void density_piece(void *user, uint32_t piece, uint32_t thread)
     const struct groom_strands *s = scene->strands;
     (void)thread;
     for (uint32_t i = piece * RENDER_PIECE; i < s->n_strands && i < (piece + 1) * RENDER_PIECE; i++)
-        add_strand(&scene->grid, (const float(*)[3])s->points + s->first[i], s->first[i + 1] - s->first[i]);
+        if (i % scene->stride == 0)
+            add_strand(&scene->grid, (const float(*)[3])s->points + s->first[i], s->first[i + 1] - s->first[i]);
 }
 
 /* --- light ----------------------------------------------------------------------- */
@@ -162,7 +163,8 @@ void render_light_at(const struct render_light_grid *grid, const float p[3], flo
     float f[3], depth = 0, open = 0;
     for (int k = 0; k < 3; k++) {
         float x = (p[k] - grid->origin[k]) / grid->cell - 0.5f;
-        x = fminf(fmaxf(x, 0), (float)grid->size[k] - 1.001f);
+        float most = (float)grid->size[k] - 1.001f;
+        x = x > 0 ? x < most ? x : most : 0;
         f[k] = x - (float)(size_t)x;
         base += (size_t)x * step[k];
     }

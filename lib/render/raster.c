@@ -11,6 +11,11 @@
 #define BAND_ROWS 32u      /* pixels */
 #define CHUNK_VERTICES 16u /* of the strands, with the rows they touch, so that a band passes over others */
 
+struct sample {
+    float depth;
+    uint32_t color;
+};
+
 struct span {
     float low, high; /* rows of samples; low > high: nothing to draw */
 };
@@ -19,9 +24,9 @@ struct raster {
     const struct render_scene *scene;
     uint8_t *rgba;
     int side;                   /* samples */
+    float widest;               /* hair, in samples, as drawn along an axis */
     struct span *chunks;        /* in order of the vertices, CHUNK_VERTICES each */
-    float *depths;              /* [threads][band_samples] */
-    uint32_t *colors;
+    struct sample *samples;     /* [threads][band_samples] */
     size_t band_samples;
 };
 
@@ -29,21 +34,28 @@ struct raster {
 struct band {
     const struct raster *raster;
     int top, bottom, side;
-    float *depths;
-    uint32_t *colors;
+    struct sample *samples;
 };
+
+static struct sample *sample_at(const struct band *band, int x, int y)
+{
+    return &band->samples[(size_t)(y - band->top) * (size_t)band->side + (size_t)x];
+}
 
 static void put(struct band *band, int x, int y, float depth, uint32_t color)
 {
-    size_t at = (size_t)(y - band->top) * (size_t)band->side + (size_t)x;
-    if (depth < band->depths[at]) {
-        band->depths[at] = depth;
-        band->colors[at] = color;
-    }
+    struct sample *sample = sample_at(band, x, y);
+    if (depth < sample->depth)
+        *sample = (struct sample){depth, color};
 }
 
+/* Without SSE4 the library's are calls, and these run for every segment. */
 static int at_least(int a, int b) { return a > b ? a : b; }
 static int at_most(int a, int b) { return a < b ? a : b; }
+static float lesser(float a, float b) { return a < b ? a : b; }
+static float greater(float a, float b) { return a > b ? a : b; }
+static int ceiling(float x) { return (int)x + ((float)(int)x < x); }
+static int below(float x) { return (int)x - ((float)(int)x > x); }
 
 /* --- hair -------------------------------------------------------------------------- */
 
@@ -52,11 +64,11 @@ static int at_most(int a, int b) { return a < b ? a : b; }
 static void draw_steep(struct band *band, const struct render_vertex *a, const struct render_vertex *b, float width, uint32_t color)
 {
     float slope = (b->x - a->x) / (b->y - a->y), fall = (b->depth - a->depth) / (b->y - a->y);
-    int first = at_least((int)ceilf(a->y - 0.5f), band->top), end = at_most((int)ceilf(b->y - 0.5f), band->bottom);
+    int first = at_least(ceiling(a->y - 0.5f), band->top), end = at_most(ceiling(b->y - 0.5f), band->bottom);
     int bar = at_least(1, (int)(width + 0.5f));
     for (int y = first; y < end; y++) {
         float along = (float)y + 0.5f - a->y;
-        int left = (int)floorf(a->x + slope * along - 0.5f * (float)bar + 0.5f);
+        int left = below(a->x + slope * along - 0.5f * (float)bar + 0.5f);
         for (int x = at_least(left, 0); x < left + bar && x < band->side; x++)
             put(band, x, y, a->depth + fall * along, color);
     }
@@ -66,11 +78,11 @@ static void draw_steep(struct band *band, const struct render_vertex *a, const s
 static void draw_flat(struct band *band, const struct render_vertex *a, const struct render_vertex *b, float width, uint32_t color)
 {
     float slope = (b->y - a->y) / (b->x - a->x), fall = (b->depth - a->depth) / (b->x - a->x);
-    int first = at_least((int)ceilf(a->x - 0.5f), 0), end = at_most((int)ceilf(b->x - 0.5f), band->side);
+    int first = at_least(ceiling(a->x - 0.5f), 0), end = at_most(ceiling(b->x - 0.5f), band->side);
     int bar = at_least(1, (int)(width + 0.5f));
     for (int x = first; x < end; x++) {
         float along = (float)x + 0.5f - a->x;
-        int above = (int)floorf(a->y + slope * along - 0.5f * (float)bar + 0.5f);
+        int above = below(a->y + slope * along - 0.5f * (float)bar + 0.5f);
         for (int y = at_least(above, band->top); y < above + bar && y < band->bottom; y++)
             put(band, x, y, a->depth + fall * along, color);
     }
@@ -78,7 +90,7 @@ static void draw_flat(struct band *band, const struct render_vertex *a, const st
 
 static void draw_segment(struct band *band, const struct render_vertex *a, const struct render_vertex *b, float width)
 {
-    float dx = fabsf(b->x - a->x), dy = fabsf(b->y - a->y), longer = fmaxf(dx, dy);
+    float dx = fabsf(b->x - a->x), dy = fabsf(b->y - a->y), longer = greater(dx, dy);
     if (!(longer > 0))
         return;
     width *= sqrtf(dx * dx + dy * dy) / longer; /* the bars lie along an axis, not across the segment */
@@ -101,9 +113,9 @@ static void draw_run(struct band *band, uint32_t first, uint32_t end, uint32_t s
         const struct render_vertex *a = &scene->hair[i], *b = a + 1;
         if (isnan(a->y) || isnan(b->y))
             continue;
-        float width = width_in_samples(scene, 0.5f * (a->depth + b->depth)), reach = width + 1;
-        if (fmaxf(a->y, b->y) + reach >= (float)band->top && fminf(a->y, b->y) - reach <= (float)band->bottom)
-            draw_segment(band, a, b, width);
+        float reach = band->raster->widest + 1;
+        if (greater(a->y, b->y) + reach >= (float)band->top && lesser(a->y, b->y) - reach <= (float)band->bottom)
+            draw_segment(band, a, b, width_in_samples(scene, 0.5f * (a->depth + b->depth)));
     }
 }
 
@@ -112,7 +124,7 @@ static uint32_t chunk_of(uint32_t vertex) { return vertex / CHUNK_VERTICES; }
 static void draw_hair(struct band *band)
 {
     const struct groom_strands *s = band->raster->scene->strands;
-    for (uint32_t strand = 0; strand < s->n_strands; strand++) {
+    for (uint32_t strand = 0; strand < s->n_strands; strand += band->raster->scene->stride) {
         uint32_t end = s->first[strand + 1];
         for (uint32_t i = s->first[strand], next; i < end; i = next) {
             const struct span *span = &band->raster->chunks[chunk_of(i)];
@@ -136,9 +148,8 @@ static void span_piece(void *user, uint32_t piece, uint32_t thread)
         for (uint32_t i = v; i < n && i <= v + CHUNK_VERTICES; i++) {
             if (isnan(scene->hair[i].y))
                 continue;
-            float reach = 2 * width_in_samples(scene, scene->hair[i].depth) + 2;
-            span.low = fminf(span.low, scene->hair[i].y - reach);
-            span.high = fmaxf(span.high, scene->hair[i].y + reach);
+            span.low = lesser(span.low, scene->hair[i].y - raster->widest - 1);
+            span.high = greater(span.high, scene->hair[i].y + raster->widest + 1);
         }
         raster->chunks[chunk_of(v)] = span;
     }
@@ -179,7 +190,7 @@ static void draw_triangle(struct band *band, const struct render_vertex *const v
             float cx = (float)x + 0.5f, cy = (float)y + 0.5f;
             float w[3] = {edge(v[1], v[2], cx, cy) / area, edge(v[2], v[0], cx, cy) / area, edge(v[0], v[1], cx, cy) / area};
             float depth = w[0] * v[0]->depth + w[1] * v[1]->depth + w[2] * v[2]->depth;
-            if (w[0] >= 0 && w[1] >= 0 && w[2] >= 0 && depth < band->depths[(size_t)(y - band->top) * (size_t)band->side + (size_t)x])
+            if (w[0] >= 0 && w[1] >= 0 && w[2] >= 0 && depth < sample_at(band, x, y)->depth)
                 put(band, x, y, depth, blend_colors(v, w));
         }
 }
@@ -221,7 +232,7 @@ static void resolve_pixel(const struct band *band, uint32_t x, uint32_t y, uint8
     for (uint32_t j = 0; j < samples; j++)
         for (uint32_t i = 0; i < samples; i++) {
             float color[3];
-            color_unpack(band->colors[((size_t)y * samples + j) * (size_t)band->side + (size_t)x * samples + i], color);
+            color_unpack(sample_at(band, (int)(x * samples + i), (int)(y * samples + j))->color, color);
             for (int k = 0; k < 3; k++)
                 sum[k] += color[k];
         }
@@ -234,11 +245,8 @@ static void clear_pixel(struct band *band, uint32_t x, uint32_t y)
 {
     uint32_t samples = band->raster->scene->samples, color = backdrop(band->raster, x, y);
     for (uint32_t j = 0; j < samples; j++)
-        for (uint32_t i = 0; i < samples; i++) {
-            size_t at = ((size_t)y * samples + j - (size_t)band->top) * (size_t)band->side + (size_t)x * samples + i;
-            band->depths[at] = INFINITY;
-            band->colors[at] = color;
-        }
+        for (uint32_t i = 0; i < samples; i++)
+            *sample_at(band, (int)(x * samples + i), (int)(y * samples + j)) = (struct sample){INFINITY, color};
 }
 
 static void band_piece(void *user, uint32_t piece, uint32_t thread)
@@ -247,8 +255,7 @@ static void band_piece(void *user, uint32_t piece, uint32_t thread)
     const struct render_scene *scene = raster->scene;
     uint32_t top = piece * BAND_ROWS, bottom = top + BAND_ROWS < scene->size ? top + BAND_ROWS : scene->size;
     struct band band = {.raster = raster, .top = (int)(top * scene->samples), .bottom = (int)(bottom * scene->samples),
-                        .side = raster->side, .depths = raster->depths + thread * raster->band_samples,
-                        .colors = raster->colors + thread * raster->band_samples};
+                        .side = raster->side, .samples = raster->samples + thread * raster->band_samples};
     for (uint32_t y = top; y < bottom; y++)
         for (uint32_t x = 0; x < scene->size; x++)
             clear_pixel(&band, x, y);
@@ -256,7 +263,7 @@ static void band_piece(void *user, uint32_t piece, uint32_t thread)
     draw_hair(&band);
     for (uint32_t y = top; y < bottom; y++)
         for (uint32_t x = 0; x < scene->size; x++)
-            resolve_pixel(&band, x, y - top, raster->rgba + ((size_t)y * scene->size + x) * 4);
+            resolve_pixel(&band, x, y, raster->rgba + ((size_t)y * scene->size + x) * 4);
 }
 
 groom_status render_raster(struct render_scene *scene, uint8_t *rgba, struct groom_diag *diag)
@@ -266,15 +273,14 @@ groom_status render_raster(struct render_scene *scene, uint8_t *rgba, struct gro
     size_t n_chunks = (size_t)chunk_of(n) + 1;
     raster.band_samples = (size_t)raster.side * BAND_ROWS * scene->samples;
     raster.chunks = memory_array(scene->allocator, n_chunks, sizeof *raster.chunks);
-    raster.depths = memory_array(scene->allocator, raster.band_samples * n_threads, sizeof *raster.depths);
-    raster.colors = memory_array(scene->allocator, raster.band_samples * n_threads, sizeof *raster.colors);
-    int ready = raster.chunks && raster.depths && raster.colors;
+    raster.samples = memory_array(scene->allocator, raster.band_samples * n_threads, sizeof *raster.samples);
+    raster.widest = 1.5f * width_in_samples(scene, scene->nearest);
+    int ready = raster.chunks && raster.samples;
     if (ready) {
         parallel_for(scene->context, n / RENDER_PIECE + 1, span_piece, &raster);
         parallel_for(scene->context, (scene->size + BAND_ROWS - 1) / BAND_ROWS, band_piece, &raster);
     }
     memory_release(scene->allocator, raster.chunks, n_chunks, sizeof *raster.chunks);
-    memory_release(scene->allocator, raster.depths, raster.band_samples * n_threads, sizeof *raster.depths);
-    memory_release(scene->allocator, raster.colors, raster.band_samples * n_threads, sizeof *raster.colors);
+    memory_release(scene->allocator, raster.samples, raster.band_samples * n_threads, sizeof *raster.samples);
     return ready ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for a picture of %u pixels a side", scene->size);
 }

@@ -11,6 +11,14 @@ static const float brown[3] = {0.20f, 0.105f, 0.05f};
 /* Small pictures get more samples: a hair is a smaller part of their pixels. */
 static uint32_t samples_for(uint32_t size) { return size <= 640 ? 4 : size <= 1536 ? 3 : 2; }
 
+/* More vertices than this add time, not detail: then every second, third .. strand stands for its
+ * neighbours, a little wider. */
+static uint32_t stride_for(const struct groom_strands *strands, uint32_t size)
+{
+    uint32_t most = size <= 1536 ? 4000000 : 12000000;
+    return strands->n_vertices / most + 1;
+}
+
 static groom_status check(const struct groom_strands *strands, const struct groom_mesh *head,
                           const struct groom_render_options *options, struct groom_diag *diag)
 {
@@ -32,7 +40,8 @@ groom_status groom_render_strands(const struct groom_strands *strands, const str
         return st;
     const float *color = options->color;
     struct render_scene scene = {.strands = strands, .head = head, .context = context, .allocator = memory_allocator(context),
-                                 .size = options->size, .samples = samples_for(options->size), .width = options->width_m};
+                                 .size = options->size, .samples = samples_for(options->size), .stride = stride_for(strands, options->size),
+                                 .width = options->width_m};
     memcpy(scene.color, color[0] > 0 || color[1] > 0 || color[2] > 0 ? color : brown, sizeof scene.color);
     if ((st = render_frame(&scene, options->view, diag)) != GROOM_OK)
         return st;

@@ -29,8 +29,10 @@ struct render_scene {
     const struct groom_allocator *allocator;
     struct groom_camera camera;    /* in samples */
     uint32_t size, samples;        /* pixels a side; samples a side of a pixel */
+    uint32_t stride;               /* every so many-th strand is drawn */
     float hair_min[3], hair_max[3];
     float width;                   /* of a drawn hair, metres */
+    float nearest;                 /* least depth of the hair's box, metres */
     float color[3];
     float key[3], rim[3], view[3]; /* unit vectors towards the lights and the camera */
     struct render_light_grid grid;

@@ -64,7 +64,7 @@ static struct character character_of(const struct render_scene *scene, uint32_t 
     return c;
 }
 
-static float sine(float cosine) { return sqrtf(fmaxf(0, 1 - cosine * cosine)); }
+static float sine(float cosine) { return cosine * cosine < 1 ? sqrtf(1 - cosine * cosine) : 0; }
 
 static float power16(float x)
 {
@@ -118,14 +118,24 @@ static void shade_strand(const struct render_scene *scene, uint32_t strand)
     }
 }
 
+static void pass_over(const struct render_scene *scene, uint32_t strand)
+{
+    for (uint32_t i = scene->strands->first[strand]; i < scene->strands->first[strand + 1]; i++)
+        scene->hair[i] = (struct render_vertex){NAN, NAN, 0, 0};
+}
+
 #define STRANDS_A_PIECE 256u
 
 static void hair_piece(void *user, uint32_t piece, uint32_t thread)
 {
     struct render_scene *scene = user;
     (void)thread;
-    for (uint32_t i = piece * STRANDS_A_PIECE; i < scene->strands->n_strands && i < (piece + 1) * STRANDS_A_PIECE; i++)
-        shade_strand(scene, i);
+    for (uint32_t i = piece * STRANDS_A_PIECE; i < scene->strands->n_strands && i < (piece + 1) * STRANDS_A_PIECE; i++) {
+        if (i % scene->stride == 0)
+            shade_strand(scene, i);
+        else
+            pass_over(scene, i);
+    }
 }
 
 /* --- skin -------------------------------------------------------------------------- */
