@@ -31,6 +31,8 @@ static const struct option options[] = {
     {"data", "DIR", TEXT, AT(data), "groomd-data", 0, 0, "folder of the database and the uploads; is made"},
     {"listen", "HOST:PORT", TEXT, AT(listen), "127.0.0.1:8080", 0, 0,
      "where to listen; port 0 picks a free one; [::1]:8080 for IPv6"},
+    {"hosts", "NAMES", TEXT, AT(hosts), "", 0, 0,
+     "names that this service has in a proxy, blanks between; localhost and addresses need none"},
     {"config", "FILE", TEXT, AT(config), "", 0, 0, "read options from FILE, lines of `name = value`"},
     {"workers", "N", COUNT, AT(workers), "1", 1, 256, "jobs that run at a time"},
     {"worker-threads", "N", COUNT, AT(worker_threads), "0", 0, 1024,

@@ -20,6 +20,7 @@ struct config {
     char listen[CONFIG_TEXT_SIZE]; /* HOST:PORT */
     char worker[CONFIG_TEXT_SIZE]; /* path of groom-worker; "": beside groomd */
     char launcher[CONFIG_TEXT_SIZE];
+    char hosts[CONFIG_TEXT_SIZE];  /* names of this service, blanks between */
     char config[CONFIG_TEXT_SIZE]; /* the configuration file */
     /* counts, bytes, seconds */
     uint64_t workers, worker_threads, worker_memory, job_time_s, job_attempts;

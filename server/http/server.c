@@ -87,14 +87,17 @@ static const char bad_request[] = "the request cannot be understood";
 struct lengths {
     int n_hosts, n_lengths, n_codings;
     bool chunked;
-    const char *length;
+    const char *length, *host;
 };
 
 static enum MHD_Result count_header(void *user, enum MHD_ValueKind kind, const char *name, const char *value)
 {
     struct lengths *lengths = user;
     (void)kind;
-    lengths->n_hosts += !strcasecmp(name, "Host");
+    if (!strcasecmp(name, "Host")) {
+        lengths->n_hosts++;
+        lengths->host = value;
+    }
     if (!strcasecmp(name, "Content-Length")) {
         lengths->n_lengths++;
         lengths->length = value;
@@ -136,6 +139,42 @@ static bool read_length(struct request *request)
         return false;
     }
     return true;
+}
+
+/* The name in "name:port" is this service's: an address, localhost, or one of --hosts. Any other name
+ * that leads here is somebody's who lets a browser take this machine for his own (DNS rebinding). */
+static bool is_own_name(const struct config *config, const char *authority)
+{
+    char name[256];
+    size_t n = strcspn(authority, ":");
+    if (authority[0] == '[' || n == 0 || n >= sizeof name)
+        return authority[0] == '[';
+    memcpy(name, authority, n);
+    name[n] = 0;
+    return !name[strspn(name, "0123456789.")] || !strcasecmp(name, "localhost") ||
+           router_knows(config->hosts, name);
+}
+
+/* Groomd asks for no token, so that a page of another site must not be able to command it through the
+ * browser of somebody on this machine. */
+static bool check_origin(struct request *request)
+{
+    const struct config *config = request->service->config;
+    const char *host = request_header(request, "Host"), *origin = request_header(request, "Origin");
+    if (host && !is_own_name(config, host)) {
+        respond_refusal(request, 421, "misdirected-request", "this is not the service of that name",
+                        "Host is %.100s; --hosts says which names this service has", host);
+        return false;
+    }
+    if (!origin || !strcmp(request->method, "GET") || !strcmp(request->method, "HEAD"))
+        return true;
+    const char *authority = strstr(origin, "://");
+    authority = authority ? authority + 3 : "";
+    if ((host && !strcasecmp(authority, host)) || router_knows(config->hosts, authority))
+        return true;
+    respond_refusal(request, 403, "cross-origin", "pages of other sites may not do this",
+                    "Origin is %.100s, which is not this service", origin);
+    return false;
 }
 
 static bool find_route(struct request *request)
@@ -434,8 +473,8 @@ static enum MHD_Result refuse(struct request *request)
 
 static bool check_head(struct request *request)
 {
-    return !is_answered(request) && read_length(request) && find_route(request) && check_query(request) &&
-           check_media(request) && check_size(request) &&
+    return !is_answered(request) && read_length(request) && check_origin(request) && find_route(request) &&
+           check_query(request) && check_media(request) && check_size(request) &&
            (!request->route->check || request->route->check(request));
 }
 

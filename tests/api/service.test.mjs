@@ -76,24 +76,38 @@ test('paths never leave their place', async (t) => {
   const daemon = await startDaemon(t);
   for (const path of ['/../../etc/passwd', '/v1/strands/../../etc/passwd', '/v1/strands/..%2f..%2fetc%2fpasswd/data',
     '/v1/strands/%2e%2e/data', '/v1/grooms/....//strands', '/v1/heads/str_..%5c../data', '//etc/passwd']) {
-    const answer = await raw(daemon, `GET ${path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n`);
+    const answer = await raw(daemon, `GET ${path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n`);
     assert.match(answer, /^HTTP\/1\.1 (400|404) /, path);
     assert.doesNotMatch(answer, /root:/);
   }
 });
 
+test('pages of other sites cannot command it', async (t) => {
+  const daemon = await startDaemon(t, { args: ['--hosts', 'grooms.example'] });
+  const ask = (method, headers) => raw(daemon, `${method} /v1/jobs HTTP/1.1\r\n${headers}Content-Length: ${method === 'POST' ? 2 : 0}\r\nConnection: close\r\n\r\n${method === 'POST' ? '{}' : ''}`);
+  const own = new URL(daemon.url).host;
+  for (const host of [own, 'localhost:80', '127.0.0.1', '[::1]:8080', 'grooms.example'])
+    assert.match(await ask('GET', `Host: ${host}\r\n`), /^HTTP\/1\.1 200 /, host);
+  for (const host of ['evil.example', 'evil.example:8080', '127.0.0.1.evil.example', 'localhost.evil.example', ''])
+    assert.match(await ask('GET', `Host: ${host}\r\n`), /^HTTP\/1\.1 421 /, host);
+  for (const origin of ['http://evil.example', 'null', 'http://127.0.0.1:1', 'https://'])
+    assert.match(await ask('POST', `Host: ${own}\r\nOrigin: ${origin}\r\n`), /^HTTP\/1\.1 403 [^]*problems\/cross-origin/, origin);
+  for (const origin of [daemon.url, 'https://grooms.example'])
+    assert.match(await ask('POST', `Host: ${own}\r\nOrigin: ${origin}\r\n`), /^HTTP\/1\.1 400 [^]*\/kind/, origin);
+});
+
 test('malformed HTTP gets a refusal or a closed line, and the service goes on', async (t) => {
   const daemon = await startDaemon(t);
   const refusals = [
-    'GARBAGE\r\n\r\n', '\0\0\0\0', 'GET\r\n\r\n', 'GET / HTTP/9.9\r\n\r\n', 'GET / HTTP/1.1\r\n\r\n', 'GET /%zz HTTP/1.1\r\nHost: x\r\n\r\n',
-    `GET /${'a'.repeat(9000)} HTTP/1.1\r\nHost: x\r\n\r\n`, `GET / HTTP/1.1\r\nHost: x\r\nX: ${'a'.repeat(200000)}\r\n\r\n`,
-    `GET / HTTP/1.1\r\nHost: x\r\n${'A: b\r\n'.repeat(40000)}\r\n`, 'POST /v1/jobs HTTP/1.1\r\nHost: x\r\nContent-Length: -1\r\n\r\n',
-    'POST /v1/jobs HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999999999999999999\r\n\r\n',
-    'POST /v1/jobs HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n\r\n',
+    'GARBAGE\r\n\r\n', '\0\0\0\0', 'GET\r\n\r\n', 'GET / HTTP/9.9\r\n\r\n', 'GET / HTTP/1.1\r\n\r\n', 'GET /%zz HTTP/1.1\r\nHost: localhost\r\n\r\n',
+    `GET /${'a'.repeat(9000)} HTTP/1.1\r\nHost: localhost\r\n\r\n`, `GET / HTTP/1.1\r\nHost: localhost\r\nX: ${'a'.repeat(200000)}\r\n\r\n`,
+    `GET / HTTP/1.1\r\nHost: localhost\r\n${'A: b\r\n'.repeat(40000)}\r\n`, 'POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n',
+    'POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999999999999999999\r\n\r\n',
+    'POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n\r\n',
     // two readings of one request: smuggling
-    'POST /v1/jobs HTTP/1.1\r\nHost: x\r\nContent-Length: 3\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n',
-    'POST /v1/jobs HTTP/1.1\r\nHost: x\r\nContent-Length: 3\r\nContent-Length: 42\r\n\r\nabcGET /healthz HTTP/1.1\r\nHost: x\r\n\r\n',
-    'POST /v1/jobs HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: gzip, chunked\r\n\r\n0\r\n\r\n',
+    'POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: 3\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n',
+    'POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: 3\r\nContent-Length: 42\r\n\r\nabcGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n',
+    'POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: gzip, chunked\r\n\r\n0\r\n\r\n',
   ];
   for (const bytes of refusals) {
     const answer = await raw(daemon, bytes, 4000);
@@ -109,16 +123,16 @@ test('slow senders are cut, others are not', async (t) => {
   const from = Date.now();
   const answers = await Promise.all([
     raw(daemon, 'GET / HTTP/1.1\r\nHo', wait),
-    raw(daemon, 'POST /v1/strands HTTP/1.1\r\nHost: x\r\nContent-Length: 100000\r\n\r\nHAIR', wait),
+    raw(daemon, 'POST /v1/strands HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100000\r\n\r\nHAIR', wait),
   ]);
   assert.ok(Date.now() - from < wait, 'both were cut before the test gave up');
   for (const answer of answers) assert.doesNotMatch(answer, /^HTTP\/1.1 2/);
-  assert.match(await raw(daemon, 'GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n'), /^HTTP\/1.1 200 /);
+  assert.match(await raw(daemon, 'GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n'), /^HTTP\/1.1 200 /);
 });
 
 test('many keep-alive requests on one connection', async (t) => {
   const daemon = await startDaemon(t);
-  const one = 'GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n', n = 200;
+  const one = 'GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n', n = 200;
   const answer = await raw(daemon, one.repeat(n - 1) + one.replace('\r\n\r\n', '\r\nConnection: close\r\n\r\n'), 10000);
   assert.equal((answer.match(/HTTP\/1\.1 200 /g) ?? []).length, n);
 });

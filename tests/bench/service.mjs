@@ -68,13 +68,13 @@ function exchange(port, pieces, is_complete) {
 }
 
 async function upload(port, bytes) {
-  const head = await exchange(port, [`POST /v1/strands HTTP/1.1\r\nHost: x\r\nContent-Length: ${bytes.length}\r\n\r\n`, bytes], (n, text) => text.includes('\r\n\r\n'));
+  const head = await exchange(port, [`POST /v1/strands HTTP/1.1\r\nHost: localhost\r\nContent-Length: ${bytes.length}\r\n\r\n`, bytes], (n, text) => text.includes('\r\n\r\n'));
   if (!head.startsWith('HTTP/1.1 201')) throw new Error(`the upload was not taken: ${head.slice(0, 800)}`);
 }
 
 async function download(port, path) {
   let size = Infinity, start = 0;
-  await exchange(port, [`GET ${path} HTTP/1.1\r\nHost: x\r\n\r\n`], (n, text) => {
+  await exchange(port, [`GET ${path} HTTP/1.1\r\nHost: localhost\r\n\r\n`], (n, text) => {
     if (size === Infinity && text.includes('\r\n\r\n')) {
       if (!text.startsWith('HTTP/1.1 200')) throw new Error(text.slice(0, 800));
       size = Number(/content-length: (\d+)/i.exec(text)[1]);
