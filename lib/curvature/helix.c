@@ -101,7 +101,7 @@ static void find_axis(const struct pair *k, struct axis *a)
         if (!(a->ahead > 0.0) || !(fabs(move) < 1.0))
             break;
         turn_axis(a, move);
-        if (fabs(move) < 1e-7) { /* quadratic: what is left is below rounding */
+        if (fabs(move) < 1e-6) { /* quadratic: what is left is below 1e-12 */
             evaluate(k, a);
             return;
         }

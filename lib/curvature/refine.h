@@ -18,10 +18,17 @@ struct refine_strand {
     vec3 *fitted;           /* [n_vertices] the curve there: written */
 };
 
+/* Four and eight numbers in a register or two: the controls of an element are four, a motion and a
+ * constant are seven. */
+typedef double refine_row __attribute__((vector_size(32)));
+struct refine_row8 {
+    refine_row low, high;
+};
+
 /* Scratch of one element. */
 struct refine_element {
-    double control[6][4];  /* motion of everything beyond per unit of (q, length): turn, shift */
-    double gain[4][7];     /* best control for a motion of the element's begin, and its constant */
+    refine_row control[6];      /* motion of everything beyond per unit of (q, length): turn, shift */
+    struct refine_row8 gain[4]; /* best control for a motion of the element's begin, and its constant */
 };
 
 struct refine_space {
@@ -30,14 +37,15 @@ struct refine_space {
     struct chain_state *junction;   /* [n_elements + 1] */
 };
 
-/* Fill `fitted`; returns the sum of squared distances, *worst the largest distance. */
-double refine_measure(struct refine_strand *strand, double *worst);
-
 /* Gauss-Newton with Levenberg-Marquardt damping on q, lengths and the root frame, at most n_steps;
  * stops early where no vertex is farther than `tolerance`. Linear in elements and vertices: the motion
  * beyond an element is a rigid one, so that the normal equations are eliminated tip to root in 6x6
  * blocks (the Riccati recursion). Returns the sum of squares, never more than before. */
 double refine_fit(struct refine_strand *strand, const struct refine_space *space, uint32_t n_steps,
                   double tolerance, double *worst);
+
+/* The same, per instruction set. */
+typedef double refine_fit_function(struct refine_strand *, const struct refine_space *, uint32_t, double, double *);
+refine_fit_function refine_fit_generic, refine_fit_avx2;
 
 #endif
