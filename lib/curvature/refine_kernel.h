@@ -194,7 +194,9 @@ CURVATURE_INLINE int eliminate_controls(struct stage *g, struct refine_row8 gain
 {
     double L[4][4];
     struct refine_row8 half[4]; /* L^-1 [mixed] */
-    memcpy(L, g->square, sizeof L);
+    for (int c = 0; c < 4; c++)
+        for (int d = 0; d < 4; d++)
+            L[c][d] = g->square[c][d];
     if (!factor(&L[0][0], 4))
         return 0;
     for (int c = 0; c < 4; c++) {

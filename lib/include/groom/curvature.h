@@ -337,6 +337,45 @@ GROOM_MUST_CHECK groom_status groom_superhelices_scale_curls(struct groom_superh
                                                              const struct groom_context *context,
                                                              struct groom_diag *diag);
 
+/* --- contact --------------------------------------------------------------------------- */
+
+struct groom_bvh;
+
+struct groom_contact_options {
+    uint32_t n_samples;  /* stations a strand, from root_share of its length to the tip */
+    uint32_t max_rounds; /* of pushing and solving again; 0: only report */
+    double root_share;   /* the part next to the root that may touch */
+    double margin_m;     /* how far outside a pushed station should come to lie */
+};
+
+/* 32 stations, 4 rounds, the first 5 % spared, 1 mm. */
+struct groom_contact_options groom_contact_options_default(void);
+
+struct groom_contact_report {
+    uint32_t checked;                    /* 1: this strand had anchors */
+    float depth_before_m, depth_after_m; /* how far below the surface at most, beyond where it lay at rest */
+};
+
+/* After a sculpt: strands with anchors that went into the head (a mesh with outward normals) get further
+ * anchors that hold their deepest stations outside, and are solved again with the caller's, up to
+ * max_rounds times. What lay below the surface at rest may stay as deep. What could not be brought out
+ * is told by depth_after_m.
+ * helices   the sculpt's result; q changes, lengths, roots and frames do not; untouched on error
+ * rest_q    [n_elements][3] the shape before the sculpt
+ * anchors   the sculpt's
+ * reports   [n_strands], the caller's
+ * returns   GROOM_OK, GROOM_EINVAL, GROOM_ENOMEM, GROOM_ECANCELLED
+ * threads   deterministic for any pool */
+GROOM_MUST_CHECK groom_status groom_superhelices_push_out(struct groom_superhelices *helices,
+                                                          const double (*rest_q)[3],
+                                                          const struct groom_anchor *anchors, size_t n_anchors,
+                                                          const struct groom_bvh *bvh,
+                                                          const struct groom_contact_options *options,
+                                                          const struct groom_sculpt_options *sculpt,
+                                                          const struct groom_context *context,
+                                                          struct groom_contact_report *reports,
+                                                          struct groom_diag *diag);
+
 #ifdef __cplusplus
 }
 #endif
