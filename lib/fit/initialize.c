@@ -138,8 +138,10 @@ static groom_status cluster(struct groom_fit *fit, const struct groom_context *c
  * guide its root, which is on the scalp then, while the mean of roots is below it. */
 static void nearest_roots(const struct groom_fit *fit, uint32_t *strand_of, float *squared)
 {
-    for (uint32_t g = 0; g < fit->n_guides; g++)
+    for (uint32_t g = 0; g < fit->n_guides; g++) {
         squared[g] = INFINITY;
+        strand_of[g] = 0; /* no cluster is empty, unless a checkpoint was made up */
+    }
     for (uint32_t i = 0; i < fit->n; i++) {
         uint32_t g = fit->cluster_of[i];
         const float *root = fit->target[(size_t)i * fit->m], *mean = fit->centroids[(size_t)g * fit->m];
