@@ -97,22 +97,56 @@ static void replace(const struct ruffle_job *job, uint32_t i, uint32_t donor, ui
     job->out->length[to] += blend * (h->length[from] - h->length[to]);
 }
 
-/* One Philox block serves two elements: a number for the chance and one for the donor each. */
-static void ruffle_strand(const struct ruffle_job *job, uint32_t i)
+/* Donors lie anywhere in memory: replacements are gathered first, so that their numbers can be on the
+ * way from memory all at once. */
+struct pick {
+    uint32_t strand, element, donor;
+};
+
+struct picks {
+    uint32_t n;
+    struct pick list[256];
+};
+
+static void apply_picks(const struct ruffle_job *job, struct picks *picks)
+{
+    for (uint32_t k = 0; k < picks->n; k++) {
+        size_t from = (size_t)job->in->first[picks->list[k].donor] + picks->list[k].element;
+        __builtin_prefetch(job->in->q[from]);
+        __builtin_prefetch(&job->in->length[from]);
+        __builtin_prefetch(job->phase[picks->list[k].donor]);
+    }
+    for (uint32_t k = 0; k < picks->n; k++)
+        replace(job, picks->list[k].strand, picks->list[k].donor, picks->list[k].element);
+    picks->n = 0;
+}
+
+static void add_pick(const struct ruffle_job *job, struct picks *picks, uint32_t i, uint32_t donor, uint32_t j)
+{
+    if (picks->n == sizeof picks->list / sizeof picks->list[0])
+        apply_picks(job, picks);
+    __builtin_prefetch(&job->in->first[donor]);
+    picks->list[picks->n++] = (struct pick){i, j, donor};
+}
+
+/* Draws of a strand: one Philox block holds the chances of four elements; donors, which are few, have
+ * draws of their own from here on. */
+#define DONOR_DRAWS (1u << 19)
+
+static void ruffle_strand(const struct ruffle_job *job, uint32_t i, struct picks *picks)
 {
     const struct groom_ruffle_options *o = job->options;
     struct groom_random_key key = {o->seed, o->stream};
     uint32_t n = elements_of(job->in, i), group = group_of(job, i), block[4], drawn = UINT32_MAX;
     const uint32_t *members = job->member + job->first[group];
     for (uint32_t j = o->match_elements; j < n; j++) {
-        if (drawn != j / 2)
-            groom_random_block(key, i, drawn = j / 2, block);
-        const uint32_t *numbers = block + 2 * (j % 2);
-        if ((numbers[0] + 0.5) * 0x1p-32 >= o->rho)
+        if (drawn != j / 4)
+            groom_random_block(key, i, drawn = j / 4, block);
+        if ((block[j % 4] + 0.5) * 0x1p-32 >= o->rho)
             continue;
-        uint32_t pick = (uint32_t)((uint64_t)numbers[1] * long_enough(job, group, j) >> 32);
-        if (members[pick] != i)
-            replace(job, i, members[pick], j);
+        uint32_t donor = members[groom_random_below(key, i, DONOR_DRAWS + j, long_enough(job, group, j))];
+        if (donor != i)
+            add_pick(job, picks, i, donor, j);
     }
 }
 
@@ -145,8 +179,10 @@ static void ruffle_piece(void *user, uint32_t piece, uint32_t thread)
     (void)thread;
     piece_bounds(job->in->n_strands, piece, &begin, &end);
     copy_strands(job, begin, end);
+    struct picks picks = {.n = 0};
     for (uint32_t i = begin; i < end; i++)
-        ruffle_strand(job, i);
+        ruffle_strand(job, i, &picks);
+    apply_picks(job, &picks);
 }
 
 /* --- the whole ------------------------------------------------------------------------------ */
