@@ -74,7 +74,10 @@ static double torsion_angle(const struct spline *s, uint32_t k)
     if (vec_dot(n0, n0) < LEAST_BEND * LEAST_BEND * la * la * lb * lb ||
         vec_dot(n1, n1) < LEAST_BEND * LEAST_BEND * lb * lb * lc * lc)
         return 0.0;
-    double angle = atan2(vec_dot(vec_cross(n0, n1), b) / lb, vec_dot(n0, n1));
+    double y = vec_dot(vec_cross(n0, n1), b) / lb, x = vec_dot(n0, n1), t = y / x;
+    if (x > 0.0 && fabs(t) < 0.5) /* the usual case without a call: within 0.2 % */
+        return t * (1.0 - t * t * (1.0 / 3 - t * t * (1.0 / 5 - t * t / 7)));
+    double angle = atan2(y, x);
     return fabs(angle) < 2.0 ? angle : 0.0;
 }
 

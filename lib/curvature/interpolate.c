@@ -190,8 +190,9 @@ out:
 static float *roots_of(const struct groom_superhelices *h, const struct groom_allocator *memory)
 {
     float *roots = memory_array(memory, (size_t)h->n_strands * 3, sizeof *roots);
-    for (size_t i = 0; roots && i < (size_t)h->n_strands * 3; i++)
-        roots[i] = (float)h->root[0][i];
+    for (size_t i = 0; roots && i < h->n_strands; i++)
+        for (size_t c = 0; c < 3; c++)
+            roots[3 * i + c] = (float)h->root[i][c];
     return roots;
 }
 

@@ -108,10 +108,15 @@ void spline_solve(struct spline *s)
 
 /* --- evaluation ------------------------------------------------------------------- */
 
-/* u in 0..1 where segment i has gone `want` metres: Newton, kept inside. */
+/* u in 0..1 where a segment has gone `want` of its `whole` metres: Newton, kept inside, from where it
+ * would be if the speed changed linearly. */
 static double invert_arc(const struct speed *q, double h, double want, double whole)
 {
-    double u = want / whole;
+    vec3 end = speed_at(q, 1.0);
+    double s0 = sqrt(vec_dot(q->a, q->a)), s1 = sqrt(vec_dot(end, end)), share = want / whole;
+    double u = share * (s0 + s1) / (s0 + sqrt(s0 * s0 + share * (s1 * s1 - s0 * s0)));
+    if (!(u >= 0.0 && u <= 1.0))
+        u = share;
     for (int iteration = 0; iteration < 12; iteration++) {
         vec3 d = speed_at(q, u);
         double slope = h * sqrt(vec_dot(d, d)), miss = segment_arc(q, h, u) - want;

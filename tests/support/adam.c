@@ -52,11 +52,13 @@ static void release(struct centimetres *c)
 static void adam_step(struct centimetres *c, uint32_t step)
 {
     double slow = 1.0 - pow(0.9, step), fast = 1.0 - pow(0.999, step);
+    double *q = *c->q, *m = *c->m, *v = *c->v;
+    const double *gradient = *c->gradient;
     for (uint32_t i = 0; i < 3 * c->problem.chain.n; i++) {
-        double g = c->gradient[0][i];
-        c->m[0][i] = 0.9 * c->m[0][i] + 0.1 * g;
-        c->v[0][i] = 0.999 * c->v[0][i] + 0.001 * g * g;
-        c->q[0][i] -= 0.001 * (c->m[0][i] / slow) / (sqrt(c->v[0][i] / fast) + 1e-8);
+        double g = gradient[i];
+        m[i] = 0.9 * m[i] + 0.1 * g;
+        v[i] = 0.999 * v[i] + 0.001 * g * g;
+        q[i] -= 0.001 * (m[i] / slow) / (sqrt(v[i] / fast) + 1e-8);
     }
 }
 
