@@ -61,7 +61,7 @@ PROGRAM_OF_client_groomctl_main.c = groomctl
 .DEFAULT_GOAL := all
 
 all: setup
-	@$(SUBMAKE) programs
+	+@$(SUBMAKE) programs
 
 setup:
 	@deploy/setup.sh
@@ -109,10 +109,10 @@ $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(call objects,$(SUPPORT_SOURCES)) $(PA
 tests: $(UNIT_TESTS)
 
 test: setup
-	@$(SUBMAKE) check-all
+	+@$(SUBMAKE) check-all
 
 check-all: programs tests fuzz-corpus node-packages
-	@$(SUBMAKE) lint
+	+@$(SUBMAKE) lint
 	@BUILD=$(BUILD) tests/run.sh
 
 unit: programs tests
@@ -129,7 +129,7 @@ tests/node_modules/.installed: tests/package.json tests/package-lock.json
 
 asan tsan:
 	@deploy/setup.sh
-	@$(SUBMAKE) VARIANT=$@ programs tests node-packages
+	+@$(SUBMAKE) VARIANT=$@ programs tests node-packages
 	@BUILD=build/$@ VARIANT=$@ tests/run.sh
 
 # --- fuzzing --------------------------------------------------------------------
@@ -146,7 +146,7 @@ $(FUZZ_BUILD)/fuzz_%: $(FUZZ_BUILD)/obj/tests/fuzz/fuzz_%.o $(call fuzz_objects,
 	clang $(FUZZ_FLAGS) -fsanitize=fuzzer -o $@ $^ $(LIBS_LIB) $(LIBS_SERVER) -pthread
 
 fuzz: setup
-	@$(SUBMAKE) $(addprefix $(FUZZ_BUILD)/fuzz_,$(FUZZERS))
+	+@$(SUBMAKE) $(addprefix $(FUZZ_BUILD)/fuzz_,$(FUZZERS))
 	@set -e; for f in $(FUZZERS); do \
 	    mkdir -p build/fuzz/corpus/$$f; echo "fuzz: $$f for $(FUZZ_SECONDS) s"; \
 	    $(FUZZ_BUILD)/fuzz_$$f -max_total_time=$(FUZZ_SECONDS) -timeout=10 -rss_limit_mb=1024 -print_final_stats=1 \
@@ -161,14 +161,14 @@ $(BUILD)/tests/fuzz/replay_%: $(BUILD)/obj/tests/fuzz/fuzz_%.o $(BUILD)/obj/test
 # --- benchmarks, lint, run, install -------------------------------------------------
 
 bench: setup
-	@$(SUBMAKE) programs node-packages $(BENCHES)
+	+@$(SUBMAKE) programs node-packages $(BENCHES)
 	@BUILD=$(BUILD) tests/bench/run.sh
 
 lint:
 	@tests/lint.sh
 
 run: setup
-	@$(SUBMAKE) programs
+	+@$(SUBMAKE) programs
 	@BUILD=$(BUILD) deploy/run.sh
 
 install: programs

@@ -153,9 +153,45 @@ groom_status groom_strands_resample(const struct groom_strands *in, uint32_t n_v
 
 /* --- summary -------------------------------------------------------------------- */
 
+struct box {
+    float min[3], max[3];
+};
+
+static const struct box empty_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+
+static void box_join(struct box *box, const float min[3], const float max[3])
+{
+    for (int k = 0; k < 3; k++) {
+        box->min[k] = min[k] < box->min[k] ? min[k] : box->min[k];
+        box->max[k] = max[k] > box->max[k] ? max[k] : box->max[k];
+    }
+}
+
+/* Four points at a time, so that the compiler works on whole vectors. */
+static void box_add(struct box *box, const float (*points)[3], size_t n)
+{
+    float min[4][3], max[4][3];
+    size_t n_fours = n / 4;
+    for (int i = 0; i < 4; i++) {
+        memcpy(min[i], box->min, sizeof min[i]);
+        memcpy(max[i], box->max, sizeof max[i]);
+    }
+    for (size_t four = 0; four < n_fours; four++)
+        for (int i = 0; i < 12; i++) {
+            float x = points[4 * four + (size_t)i / 3][i % 3];
+            min[i / 3][i % 3] = x < min[i / 3][i % 3] ? x : min[i / 3][i % 3];
+            max[i / 3][i % 3] = x > max[i / 3][i % 3] ? x : max[i / 3][i % 3];
+        }
+    for (int i = 0; i < 4; i++)
+        box_join(box, min[i], max[i]);
+    for (size_t i = 4 * n_fours; i < n; i++)
+        box_join(box, points[i], points[i]);
+}
+
 struct measure {
     const struct groom_strands *strands;
-    float *length; /* [n_strands] */
+    float *length;   /* [n_strands] */
+    struct box *box; /* [n_pieces] */
 };
 
 static void measure_piece(void *user, uint32_t piece, uint32_t thread)
@@ -163,9 +199,13 @@ static void measure_piece(void *user, uint32_t piece, uint32_t thread)
     const struct measure *work = user;
     uint32_t end = piece_end(piece, work->strands->n_strands);
     (void)thread;
-    for (uint32_t i = piece_begin(piece); i < end; i++)
-        work->length[i] =
-            (float)groom_polyline_length(strand_points(work->strands, i), strand_vertices(work->strands, i));
+    work->box[piece] = empty_box;
+    for (uint32_t i = piece_begin(piece); i < end; i++) {
+        const float (*points)[3] = strand_points(work->strands, i);
+        uint32_t n = strand_vertices(work->strands, i);
+        work->length[i] = (float)groom_polyline_length(points, n);
+        box_add(&work->box[piece], points, n);
+    }
 }
 
 static int compare_floats(const void *a, const void *b)
@@ -174,18 +214,23 @@ static int compare_floats(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static void bounding_box(const struct groom_strands *strands, float min[3], float max[3])
+static void summarize_lengths(float *length, uint32_t n, struct groom_strands_summary *summary)
 {
-    for (int k = 0; k < 3; k++) {
-        min[k] = strands->n_vertices ? INFINITY : 0;
-        max[k] = strands->n_vertices ? -INFINITY : 0;
+    qsort(length, n, sizeof *length, compare_floats);
+    summary->length_min = length[0];
+    summary->length_median = (length[(n - 1) / 2] + length[n / 2]) / 2;
+    summary->length_max = length[n - 1];
+}
+
+static void summarize_boxes(const struct box *boxes, uint32_t n, struct groom_strands_summary *summary)
+{
+    struct box all = empty_box;
+    for (uint32_t i = 0; i < n; i++)
+        box_join(&all, boxes[i].min, boxes[i].max);
+    for (int k = 0; k < 3; k++) { /* strands without a vertex have an empty box: a point at 0 */
+        summary->bbox_min[k] = all.min[k] <= all.max[k] ? all.min[k] : 0;
+        summary->bbox_max[k] = all.min[k] <= all.max[k] ? all.max[k] : 0;
     }
-    for (uint32_t i = 0; i < strands->n_vertices; i++)
-        for (int k = 0; k < 3; k++) {
-            float x = strands->points[i][k];
-            min[k] = x < min[k] ? x : min[k];
-            max[k] = x > max[k] ? x : max[k];
-        }
 }
 
 groom_status groom_strands_summarize(const struct groom_strands *strands, const struct groom_context *context,
@@ -195,18 +240,19 @@ groom_status groom_strands_summarize(const struct groom_strands *strands, const 
     uint32_t n = strands->n_strands;
     if (n == 0)
         return groom_fail(diag, GROOM_EEMPTY, "there are no strands to summarize");
-    struct measure work = {strands, memory_array(allocator, n, sizeof *work.length)};
-    if (!work.length)
-        return groom_fail(diag, GROOM_ENOMEM, "no memory for the lengths of %u strands", n);
-
-    parallel_for(context, n_pieces(n), measure_piece, &work);
-    qsort(work.length, n, sizeof *work.length, compare_floats);
-    summary->n_strands = n;
-    summary->n_vertices = strands->n_vertices;
-    summary->length_min = work.length[0];
-    summary->length_median = (work.length[(n - 1) / 2] + work.length[n / 2]) / 2;
-    summary->length_max = work.length[n - 1];
-    bounding_box(strands, summary->bbox_min, summary->bbox_max);
+    struct measure work = {strands, memory_array(allocator, n, sizeof *work.length),
+                           memory_array(allocator, n_pieces(n), sizeof *work.box)};
+    groom_status status = GROOM_OK;
+    if (work.length && work.box) {
+        parallel_for(context, n_pieces(n), measure_piece, &work);
+        summary->n_strands = n;
+        summary->n_vertices = strands->n_vertices;
+        summarize_lengths(work.length, n, summary);
+        summarize_boxes(work.box, n_pieces(n), summary);
+    } else {
+        status = groom_fail(diag, GROOM_ENOMEM, "no memory to measure %u strands", n);
+    }
     memory_release(allocator, work.length, n, sizeof *work.length);
-    return GROOM_OK;
+    memory_release(allocator, work.box, n_pieces(n), sizeof *work.box);
+    return status;
 }
