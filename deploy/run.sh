@@ -4,11 +4,12 @@
 # The sample is generated (groomctl sample), uploaded, fitted, exported and drawn, by the same
 # commands that a studio would script. Ctrl-C stops the daemon; what it keeps stays in $BUILD/run.
 #   GROOM_LISTEN   address (127.0.0.1:8080; a free port where that is taken)
+#   GROOM_PLACE    folder of its data ($BUILD/run)
 #   GROOM_RUN_ONCE 1: stop when the sample is done, for tests
 set -euo pipefail
 cd "$(dirname "$0")/.."
 BUILD=${BUILD:-build}
-place=$BUILD/run
+place=${GROOM_PLACE:-$BUILD/run}
 listen=${GROOM_LISTEN:-127.0.0.1:8080}
 mkdir -p "$place"
 
