@@ -50,7 +50,8 @@ struct fit_stage {
  * file. */
 #define FIT_STAGE_LIST(X)                                                                                    \
     X(initialize, 1.0)                                                                                       \
-    X(instance_weights, 0.3)
+    X(instance_weights, 0.3)                                                                                 \
+    X(guides, 0.5)
 
 enum {
 #define FIT_STAGE_INDEX(name, weight) FIT_STAGE_##name,

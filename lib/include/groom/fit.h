@@ -77,6 +77,8 @@ struct groom_fit_options {
             uint32_t iterations;        /* 3000 */
             double learning_rate_curvature, learning_rate_length, learning_rate_angle;
             double lambda, sigma_d, sigma_phi; /* gradient filter: 10, 0.3, 0.4 */
+            double cycles;  /* waves along a guide that keep half of their size: 3 */
+            double across;  /* pull of neighbours on the scalp, over that of a guide's strands: 3 */
         } guides;
         struct {
             uint32_t iterations;        /* of each loss: 3000 */

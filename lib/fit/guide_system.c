@@ -1,0 +1,353 @@
+#include "fit/guide_system.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "base/progress.h"
+
+#define BAND 3
+
+static const double difference[BAND + 1] = {-1, 3, -3, 1}; /* third: zero on what turns at one rate */
+
+/* --- the matrix --------------------------------------------------------------------- */
+
+static int add_data_row(struct sparse *matrix, const struct mean_strands *mean, uint32_t g)
+{
+    for (uint32_t at = mean->first[g]; at < mean->first[g + 1]; at++) {
+        uint32_t i = mean->member[at] / mean->n_parts;
+        const struct mean_part *own = mean->part + mean->member[at], *all = mean->part + (size_t)i * mean->n_parts;
+        for (uint32_t p = 0; p < mean->n_parts; p++) {
+            double *entry = sparse_entry(matrix, g, all[p].guide);
+            if (!entry)
+                return 0;
+            entry[0] += (double)own->shape * all[p].shape;
+            entry[1] += (double)own->shape * all[p].clumped + (double)own->clumped * all[p].shape;
+            entry[2] += (double)own->clumped * all[p].clumped;
+        }
+    }
+    return 1;
+}
+
+/* Row g of weight L^T L; L is symmetric in its pattern. */
+static int add_across_row(struct sparse *matrix, const struct sparse *l, uint32_t g, double weight)
+{
+    for (uint32_t at = l->first[g]; at < l->first[g + 1]; at++) {
+        uint32_t row = l->column[at];
+        double here = 0;
+        for (uint32_t b = l->first[row]; b < l->first[row + 1]; b++)
+            if (l->column[b] == g)
+                here = l->value[b][0];
+        for (uint32_t b = l->first[row]; b < l->first[row + 1]; b++) {
+            double *entry = sparse_entry(matrix, g, l->column[b]);
+            if (!entry)
+                return 0;
+            entry[3] += weight * here * l->value[b][0];
+        }
+    }
+    return 1;
+}
+
+static int fill_matrix(struct guide_system *system, const struct mean_strands *mean, const struct sparse *laplacian,
+                       double across)
+{
+    double nu = (double)mean->n / mean->n_guides;
+    for (uint32_t g = 0; g < system->n_guides; g++) {
+        if (!sparse_entry(&system->matrix, g, g) || !add_data_row(&system->matrix, mean, g) ||
+            !add_across_row(&system->matrix, laplacian, g, nu * across))
+            return 0;
+        sparse_end_row(&system->matrix, g);
+    }
+    return 1;
+}
+
+/* --- life ----------------------------------------------------------------------------- */
+
+groom_status guide_system_init(struct guide_system *system, const struct mean_strands *mean,
+                               const struct sparse *laplacian, double along, double across,
+                               const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    size_t size = (size_t)mean->n_guides * mean->m;
+    *system = (struct guide_system){.n_guides = mean->n_guides, .m = mean->m, .allocator = allocator,
+                                    .along = along * mean->n / mean->n_guides};
+    int fine = sparse_init(&system->matrix, mean->n_guides, allocator);
+    system->power = memory_array(allocator, mean->m, sizeof *system->power);
+    system->hold = memory_array_zero(allocator, size, sizeof *system->hold);
+    system->pull = memory_array(allocator, size, sizeof *system->pull);
+    system->band = memory_array(allocator, size - mean->n_guides, sizeof *system->band);
+    system->r = memory_array(allocator, size, sizeof *system->r);
+    system->z = memory_array(allocator, size, sizeof *system->z);
+    system->p = memory_array(allocator, size, sizeof *system->p);
+    system->q = memory_array(allocator, size, sizeof *system->q);
+    system->partial = memory_array(allocator, mean->n_guides, sizeof *system->partial);
+    if (!fine || !system->power || !system->hold || !system->pull || !system->band || !system->r || !system->z ||
+        !system->p || !system->q || !system->partial || !fill_matrix(system, mean, laplacian, across))
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for the equations of %u guides", mean->n_guides);
+    for (uint32_t j = 0; j < mean->m; j++) {
+        double rest = mean->rest[j];
+        system->power[j][0] = rest * rest, system->power[j][1] = rest * (1 - rest), system->power[j][2] = (1 - rest) * (1 - rest);
+    }
+    mean_strands_pull(mean, system->pull, context);
+    return GROOM_OK;
+}
+
+void guide_system_finish(struct guide_system *system)
+{
+    const struct groom_allocator *allocator = system->allocator;
+    size_t size = (size_t)system->n_guides * system->m;
+    if (!allocator)
+        return;
+    sparse_finish(&system->matrix);
+    memory_release(allocator, system->power, system->m, sizeof *system->power);
+    memory_release(allocator, system->hold, size, sizeof *system->hold);
+    memory_release(allocator, system->pull, size, sizeof *system->pull);
+    memory_release(allocator, system->band, size - system->n_guides, sizeof *system->band);
+    memory_release(allocator, system->r, size, sizeof *system->r);
+    memory_release(allocator, system->z, size, sizeof *system->z);
+    memory_release(allocator, system->p, size, sizeof *system->p);
+    memory_release(allocator, system->q, size, sizeof *system->q);
+    memory_release(allocator, system->partial, system->n_guides, sizeof *system->partial);
+}
+
+/* --- product --------------------------------------------------------------------------- */
+
+struct product {
+    struct guide_system *system;
+    const double (*shape)[3];
+    double (*out)[3];
+};
+
+static double weight_at(const struct guide_system *system, const double value[SPARSE_WIDTH], uint32_t j)
+{
+    const double *power = system->power[j];
+    return power[0] * value[0] + power[1] * value[1] + power[2] * value[2] + value[3];
+}
+
+/* Third differences and their transpose. */
+static void add_along(const struct guide_system *system, const double (*restrict s)[3], double (*restrict out)[3])
+{
+    for (uint32_t j = 0; j + BAND < system->m; j++)
+        for (int c = 0; c < 3; c++) {
+            double sum = 0;
+            for (int d = 0; d <= BAND; d++)
+                sum += difference[d] * s[j + d][c];
+            for (int d = 0; d <= BAND; d++)
+                out[j + d][c] += system->along * difference[d] * sum;
+        }
+}
+
+static void apply_row(void *user, uint32_t g, uint32_t thread)
+{
+    const struct product *job = user;
+    const struct guide_system *system = job->system;
+    uint32_t m = system->m;
+    const double (*own)[3] = job->shape + (size_t)g * m;
+    double (*restrict out)[3] = job->out + (size_t)g * m;
+    (void)thread;
+    for (uint32_t j = 0; j < m; j++)
+        for (int c = 0; c < 3; c++)
+            out[j][c] = system->hold[(size_t)g * m + j] * own[j][c];
+    for (uint32_t at = system->matrix.first[g]; at < system->matrix.first[g + 1]; at++) {
+        const double (*restrict s)[3] = job->shape + (size_t)system->matrix.column[at] * m;
+        for (uint32_t j = 1; j < m; j++) {
+            double weight = weight_at(system, system->matrix.value[at], j);
+            for (int c = 0; c < 3; c++)
+                out[j][c] += weight * s[j][c];
+        }
+    }
+    add_along(system, own, out);
+    memset(out[0], 0, sizeof out[0]); /* the root does not move */
+}
+
+void guide_system_apply(struct guide_system *system, const double (*shape)[3], double (*out)[3],
+                        const struct groom_context *context)
+{
+    struct product job = {system, shape, out};
+    parallel_for(context, system->n_guides, apply_row, &job);
+}
+
+/* --- preconditioner --------------------------------------------------------------------- */
+
+/* A guide's own block: row j - 1 is vertex j, entry BAND - d couples it with vertex j - d. */
+static void fill_block(const struct guide_system *system, uint32_t g, double (*band)[BAND + 1])
+{
+    uint32_t m = system->m;
+    const double *own = NULL;
+    for (uint32_t at = system->matrix.first[g]; at < system->matrix.first[g + 1]; at++)
+        if (system->matrix.column[at] == g)
+            own = system->matrix.value[at];
+    memset(band, 0, (m - 1) * sizeof *band);
+    for (uint32_t j = 1; j < m; j++)
+        band[j - 1][BAND] = weight_at(system, own, j) + system->hold[(size_t)g * m + j];
+    for (uint32_t j = 0; j + BAND < m; j++)
+        for (uint32_t a = 0; a <= BAND; a++)
+            for (uint32_t b = 0; b <= a; b++)
+                if (j + b > 0)
+                    band[j + a - 1][BAND - (a - b)] += system->along * difference[a] * difference[b];
+}
+
+static double at_band(const double (*band)[BAND + 1], uint32_t row, uint32_t column)
+{
+    return row - column > BAND ? 0 : band[row][BAND - (row - column)];
+}
+
+/* Banded Cholesky, in place. A pivot that is nothing (a guide without strands, alone) is made 1. */
+static void factor(double (*band)[BAND + 1], uint32_t n)
+{
+    for (uint32_t row = 0; row < n; row++)
+        for (uint32_t column = row < BAND ? 0 : row - BAND; column <= row; column++) {
+            double sum = band[row][BAND - (row - column)];
+            for (uint32_t k = row < BAND ? 0 : row - BAND; k < column; k++)
+                sum -= at_band((const double (*)[BAND + 1])band, row, k) * at_band((const double (*)[BAND + 1])band, column, k);
+            if (column == row)
+                band[row][BAND] = sum > 1e-12 ? sqrt(sum) : 1;
+            else
+                band[row][BAND - (row - column)] = sum / band[column][BAND];
+        }
+}
+
+static void factor_row(void *user, uint32_t g, uint32_t thread)
+{
+    const struct guide_system *system = user;
+    double (*band)[BAND + 1] = system->band + (size_t)g * (system->m - 1);
+    (void)thread;
+    fill_block(system, g, band);
+    factor(band, system->m - 1);
+}
+
+/* z = (L L^T)^-1 r of one guide */
+static void precondition(const struct guide_system *system, uint32_t g)
+{
+    uint32_t n = system->m - 1;
+    const double (*band)[BAND + 1] = (const double (*)[BAND + 1])(system->band + (size_t)g * n);
+    const double (*r)[3] = (const double (*)[3])(system->r + (size_t)g * system->m + 1);
+    double (*z)[3] = system->z + (size_t)g * system->m + 1;
+    memset(z[-1], 0, sizeof z[-1]);
+    for (int c = 0; c < 3; c++) {
+        for (uint32_t row = 0; row < n; row++) {
+            double sum = r[row][c];
+            for (uint32_t d = 1; d <= BAND && d <= row; d++)
+                sum -= band[row][BAND - d] * z[row - d][c];
+            z[row][c] = sum / band[row][BAND];
+        }
+        for (uint32_t row = n; row-- > 0;) {
+            double sum = z[row][c];
+            for (uint32_t d = 1; d <= BAND && row + d < n; d++)
+                sum -= band[row + d][BAND - d] * z[row + d][c];
+            z[row][c] = sum / band[row][BAND];
+        }
+    }
+}
+
+/* --- conjugate gradients -------------------------------------------------------------------- */
+
+struct iteration {
+    struct guide_system *system;
+    double (*x)[3];
+    double alpha, beta;
+};
+
+static double dot(const double (*a)[3], const double (*b)[3], uint32_t n)
+{
+    double sum = 0;
+    for (uint32_t j = 0; j < n; j++)
+        sum += a[j][0] * b[j][0] + a[j][1] * b[j][1] + a[j][2] * b[j][2];
+    return sum;
+}
+
+static double total(const struct guide_system *system)
+{
+    double sum = 0;
+    for (uint32_t g = 0; g < system->n_guides; g++)
+        sum += system->partial[g];
+    return sum;
+}
+
+/* r = pull - q */
+static void residual_row(void *user, uint32_t g, uint32_t thread)
+{
+    struct iteration *job = user;
+    struct guide_system *system = job->system;
+    size_t first = (size_t)g * system->m;
+    (void)thread;
+    for (uint32_t j = 0; j < system->m; j++)
+        for (int c = 0; c < 3; c++)
+            system->r[first + j][c] = j ? system->pull[first + j][c] - system->q[first + j][c] : 0;
+    system->partial[g] = dot((const double (*)[3])(system->pull + first), (const double (*)[3])(system->pull + first), system->m);
+}
+
+static void precondition_row(void *user, uint32_t g, uint32_t thread)
+{
+    struct iteration *job = user;
+    struct guide_system *system = job->system;
+    size_t first = (size_t)g * system->m;
+    (void)thread;
+    precondition(system, g);
+    system->partial[g] = dot((const double (*)[3])(system->r + first), (const double (*)[3])(system->z + first), system->m);
+}
+
+static void direction_row(void *user, uint32_t g, uint32_t thread)
+{
+    struct iteration *job = user;
+    struct guide_system *system = job->system;
+    (void)thread;
+    for (size_t v = (size_t)g * system->m; v < (size_t)(g + 1) * system->m; v++)
+        for (int c = 0; c < 3; c++)
+            system->p[v][c] = system->z[v][c] + job->beta * system->p[v][c];
+}
+
+static void curvature_row(void *user, uint32_t g, uint32_t thread)
+{
+    struct iteration *job = user;
+    struct guide_system *system = job->system;
+    size_t first = (size_t)g * system->m;
+    struct product product = {system, (const double (*)[3])system->p, system->q};
+    apply_row(&product, g, thread);
+    system->partial[g] = dot((const double (*)[3])(system->p + first), (const double (*)[3])(system->q + first), system->m);
+}
+
+static void advance_row(void *user, uint32_t g, uint32_t thread)
+{
+    struct iteration *job = user;
+    struct guide_system *system = job->system;
+    size_t first = (size_t)g * system->m;
+    (void)thread;
+    for (size_t v = first; v < first + system->m; v++)
+        for (int c = 0; c < 3; c++) {
+            job->x[v][c] += job->alpha * system->p[v][c];
+            system->r[v][c] -= job->alpha * system->q[v][c];
+        }
+    system->partial[g] = dot((const double (*)[3])(system->r + first), (const double (*)[3])(system->r + first), system->m);
+}
+
+uint32_t guide_system_solve(struct guide_system *system, double (*shape)[3], double tolerance, uint32_t most_iterations,
+                            const struct groom_context *context)
+{
+    struct iteration job = {.system = system, .x = shape};
+    uint32_t n = system->n_guides, iteration = 0;
+    parallel_for(context, n, factor_row, system);
+    guide_system_apply(system, (const double (*)[3])shape, system->q, context);
+    parallel_for(context, n, residual_row, &job);
+    double enough = tolerance * tolerance * total(system), rz = 0;
+    memset(system->p, 0, (size_t)n * system->m * sizeof *system->p);
+    for (; iteration < most_iterations && !progress_cancelled(context); iteration++) {
+        parallel_for(context, n, precondition_row, &job);
+        double next = total(system);
+        if (!(next > 0))
+            break;
+        job.beta = rz > 0 ? next / rz : 0;
+        rz = next;
+        parallel_for(context, n, direction_row, &job);
+        parallel_for(context, n, curvature_row, &job);
+        double curvature = total(system);
+        if (!(curvature > 0))
+            break;
+        job.alpha = rz / curvature;
+        parallel_for(context, n, advance_row, &job);
+        if (total(system) <= enough)
+            break;
+    }
+    return iteration;
+}

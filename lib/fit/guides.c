@@ -1,0 +1,293 @@
+/* Stage `guides`: Chang et al. 2025, Section 5.4.
+ *
+ * The expectation of a strand is linear in the shapes of the guides (fit/mean_strands.h), so the paper's
+ * loss (Eq. 7) is a linear least-squares problem. Alone it would bake the strands' random variation into
+ * the guides, which the paper stops by filtering the gradient across the scalp (Eq. 9), and by taking
+ * curvatures instead of vertices as what is moved (Eq. 10; Crane et al. 2013), whose length is that of a
+ * bending energy. Here both stand in the problem itself, as what it costs a guide to turn unevenly and to
+ * be unlike its neighbours, and its minimum is found by conjugate gradients. Each guide then gets vertices
+ * at equal steps of arc length: one length a guide, no ripples.
+ *
+ * Guides that end up in the head where their strands are out are held at its surface, and the problem is
+ * solved again. */
+#include <math.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/progress.h"
+#include "fit/guide_laplacian.h"
+#include "fit/guide_system.h"
+#include "fit/mean_strands.h"
+#include "fit/state.h"
+
+enum phase { SOLVE, ASSIGN, ENDED };
+
+#define TOLERANCE 1e-6
+#define MOST_ITERATIONS 300
+#define ROUNDS_AT_HEAD 2
+#define HOLD 1.0      /* of a vertex at the head, over the weight of a guide's strands */
+#define ASKED 8       /* strands of a guide that are asked whether they are in the head */
+#define FARTHEST 100.0 /* vertex from its root, over the size of the hair */
+#define EVENINGS 3    /* resampling passes until chords are as even as arcs */
+
+struct solution {
+    struct groom_fit *fit;
+    struct mean_strands mean;
+    struct sparse laplacian;
+    struct guide_system system;
+    double (*shape)[3];     /* [n_guides * m] of the target's size, from the root */
+    double (*line)[3];      /* [m] */
+    double *partial;        /* of the loss */
+    float (*direction)[3];  /* [n_guides] at the root, unit */
+    float (*point)[3];      /* [n_guides * m] metres */
+    struct groom_surface_point *surface; /* [n_guides * m] nearest to them */
+};
+
+/* --- shapes ------------------------------------------------------------------------------ */
+
+static void load_shapes(struct solution *solution)
+{
+    const struct groom_fit *fit = solution->fit;
+    for (uint32_t g = 0; g < fit->n_guides; g++) {
+        const float (*x)[3] = (const float (*)[3])(fit->groom->guides + (size_t)g * fit->m);
+        for (uint32_t j = 0; j < fit->m; j++)
+            for (int c = 0; c < 3; c++)
+                solution->shape[(size_t)g * fit->m + j][c] = ((double)x[j][c] - x[0][c]) / fit->scale;
+    }
+}
+
+/* Guide g in metres. */
+static void points_of(const struct solution *solution, uint32_t g, float (*out)[3])
+{
+    const struct groom_fit *fit = solution->fit;
+    float root[3];
+    memcpy(root, fit->groom->guides[(size_t)g * fit->m], sizeof root);
+    for (uint32_t j = 0; j < fit->m; j++)
+        for (int c = 0; c < 3; c++)
+            out[j][c] = (float)(root[c] + fit->scale * solution->shape[(size_t)g * fit->m + j][c]);
+}
+
+/* Whether a solution is one: weights of a damaged or odd groom may leave none. */
+static int is_sane(const struct solution *solution, uint32_t g)
+{
+    const double (*s)[3] = (const double (*)[3])(solution->shape + (size_t)g * solution->fit->m);
+    for (uint32_t j = 0; j < solution->fit->m; j++)
+        for (int c = 0; c < 3; c++)
+            if (!(fabs(s[j][c]) < FARTHEST))
+                return 0;
+    return 1;
+}
+
+/* Where the guide leaves the scalp: over the first twentieth, for one segment is too little. */
+static void root_direction(const struct solution *solution, uint32_t g)
+{
+    uint32_t m = solution->fit->m, at = m / 20 > 1 ? m / 20 : 1;
+    const double *s = solution->shape[(size_t)g * m + at];
+    double length = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+    for (int c = 0; c < 3; c++)
+        solution->direction[g][c] = length > 0 ? (float)(s[c] / length) : 0;
+}
+
+static double distance(const double a[3], const double b[3])
+{
+    double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return sqrt(x * x + y * y + z * z);
+}
+
+/* Vertices at equal steps along the polyline they make. */
+static void even_out(double (*shape)[3], double (*line)[3], uint32_t m)
+{
+    double all = 0, begin = 0, length = distance(shape[0], shape[1]);
+    uint32_t at = 0;
+    memcpy(line, shape, m * sizeof *shape);
+    for (uint32_t j = 0; j + 1 < m; j++)
+        all += distance(line[j], line[j + 1]);
+    for (uint32_t j = 1; j + 1 < m; j++) {
+        double wanted = all * j / (m - 1);
+        while (at + 2 < m && begin + length < wanted) {
+            begin += length;
+            at++;
+            length = distance(line[at], line[at + 1]);
+        }
+        double t = length > 0 ? fmin((wanted - begin) / length, 1) : 0;
+        for (int c = 0; c < 3; c++)
+            shape[j][c] = line[at][c] + t * (line[at + 1][c] - line[at][c]);
+    }
+}
+
+/* --- out of the head -------------------------------------------------------------------------- */
+
+/* Whether most of the strands that the guide shapes, of the first few, are in the head at vertex j. */
+static int strands_are_in(const struct solution *solution, uint32_t g, uint32_t j, float clearance)
+{
+    const struct groom_fit *fit = solution->fit;
+    const struct mean_strands *mean = &solution->mean;
+    int asked = 0, in = 0;
+    for (uint32_t at = mean->first[g]; at < mean->first[g + 1] && asked < ASKED; at++, asked++) {
+        const float *x = fit->target[(size_t)(mean->member[at] / mean->n_parts) * fit->m + j];
+        float p[3] = {fit->centre[0] + fit->scale * x[0], fit->centre[1] + fit->scale * x[1],
+                      fit->centre[2] + fit->scale * x[2]};
+        in += groom_bvh_signed_distance(fit->bvh, p) < -clearance;
+    }
+    return 2 * in > asked;
+}
+
+static void hold_at(struct solution *solution, uint32_t g, uint32_t j, const float place[3])
+{
+    const struct groom_fit *fit = solution->fit;
+    size_t v = (size_t)g * fit->m + j;
+    double weight = HOLD * fit->n / fit->n_guides;
+    solution->system.hold[v] = weight;
+    for (int c = 0; c < 3; c++)
+        solution->system.pull[v][c] += weight * ((double)place[c] - fit->groom->guides[(size_t)g * fit->m][c]) / fit->scale;
+}
+
+/* By the side of the nearest face, which is quick, and, of those, by what winds around. */
+static int is_in_head(const struct groom_fit *fit, const float p[3], const struct groom_surface_point *surface,
+                      float clearance)
+{
+    float side = 0;
+    for (int c = 0; c < 3; c++)
+        side += (p[c] - surface->position[c]) * surface->normal[c];
+    return side < 0 && surface->distance > clearance && groom_bvh_inside(fit->bvh, p);
+}
+
+/* Holds vertices that are deep in the head at the nearest point of its surface; returns how many. */
+static uint32_t hold_out_of_head(struct solution *solution, const struct groom_context *context)
+{
+    const struct groom_fit *fit = solution->fit;
+    float clearance = (float)fit->options.stages.initialize.head_clearance * fit->ordinary;
+    uint32_t n_held = 0;
+    for (uint32_t g = 0; g < fit->n_guides; g++)
+        points_of(solution, g, solution->point + (size_t)g * fit->m);
+    groom_bvh_closest_points(fit->bvh, (const float (*)[3])solution->point, fit->n_guides * fit->m, solution->surface,
+                             context);
+    for (uint32_t g = 0; g < fit->n_guides; g++)
+        for (uint32_t j = 1; j < fit->m; j++) {
+            size_t v = (size_t)g * fit->m + j;
+            if (solution->system.hold[v] == 0 &&
+                is_in_head(fit, solution->point[v], &solution->surface[v], clearance) &&
+                !strands_are_in(solution, g, j, clearance)) {
+                hold_at(solution, g, j, solution->surface[v].position);
+                n_held++;
+            }
+        }
+    return n_held;
+}
+
+/* --- the problem --------------------------------------------------------------------------------- */
+
+/* The weight of third differences at which waves of `cycles` a guide keep half of their size. */
+static double along_of(double cycles, uint32_t m) { return pow(2 * sin(M_PI * fmin(cycles / (m - 1), 0.5)), -6); }
+
+static groom_status solution_init(struct solution *solution, struct groom_fit *fit, const struct groom_context *context,
+                                  struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    size_t size = (size_t)fit->n_guides * fit->m;
+    double cycles = fit->options.stages.guides.cycles, across = fit->options.stages.guides.across;
+    groom_status st;
+    *solution = (struct solution){.fit = fit};
+    solution->shape = memory_array(allocator, size, sizeof *solution->shape);
+    solution->line = memory_array(allocator, fit->m, sizeof *solution->line);
+    solution->partial = memory_array(allocator, mean_strands_pieces(fit->n), sizeof *solution->partial);
+    solution->direction = memory_array(allocator, fit->n_guides, sizeof *solution->direction);
+    solution->point = memory_array(allocator, size, sizeof *solution->point);
+    solution->surface = memory_array(allocator, size, sizeof *solution->surface);
+    if (!solution->shape || !solution->line || !solution->partial || !solution->direction || !solution->point ||
+        !solution->surface)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for the shapes of %u guides", fit->n_guides);
+    load_shapes(solution);
+    for (uint32_t g = 0; g < fit->n_guides; g++)
+        root_direction(solution, g);
+    if ((st = mean_strands_init(&solution->mean, fit, context, diag)) != GROOM_OK ||
+        (st = guide_laplacian((const float (*)[2])fit->groom->guide_uv, (const float (*)[3])solution->direction,
+                              fit->n_guides, fit->options.stages.guides.sigma_d, &solution->laplacian, context,
+                              diag)) != GROOM_OK)
+        return st;
+    return guide_system_init(&solution->system, &solution->mean, &solution->laplacian, along_of(cycles, fit->m), across,
+                             context, diag);
+}
+
+static void solution_finish(struct solution *solution, const struct groom_context *context)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    const struct groom_fit *fit = solution->fit;
+    size_t size = (size_t)fit->n_guides * fit->m;
+    guide_system_finish(&solution->system);
+    mean_strands_finish(&solution->mean);
+    sparse_finish(&solution->laplacian);
+    memory_release(allocator, solution->shape, size, sizeof *solution->shape);
+    memory_release(allocator, solution->line, fit->m, sizeof *solution->line);
+    memory_release(allocator, solution->partial, mean_strands_pieces(fit->n), sizeof *solution->partial);
+    memory_release(allocator, solution->direction, fit->n_guides, sizeof *solution->direction);
+    memory_release(allocator, solution->point, size, sizeof *solution->point);
+    memory_release(allocator, solution->surface, size, sizeof *solution->surface);
+}
+
+/* Eq. 7 a vertex, square metres. */
+static double loss_of(const struct solution *solution, const struct groom_context *context)
+{
+    double metres = solution->fit->scale;
+    return metres * metres *
+           mean_strands_loss(&solution->mean, (const double (*)[3])solution->shape, solution->partial, context);
+}
+
+static groom_status cancelled(struct groom_diag *diag)
+{
+    return groom_fail(diag, GROOM_ECANCELLED, "cancelled while guides were solved for");
+}
+
+static groom_status solve_rounds(struct solution *solution, const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_fit *fit = solution->fit;
+    for (uint32_t round = 0; round <= ROUNDS_AT_HEAD; round++) {
+        guide_system_solve(&solution->system, solution->shape, TOLERANCE, MOST_ITERATIONS, context);
+        if (progress_cancelled(context))
+            return cancelled(diag);
+        progress_loss(context, "L_g", round + 1, loss_of(solution, context));
+        if (!fit->bvh || round == ROUNDS_AT_HEAD || hold_out_of_head(solution, context) == 0)
+            break;
+    }
+    for (uint32_t g = 0; g < fit->n_guides; g++)
+        for (int pass = 0; pass < EVENINGS; pass++)
+            even_out(solution->shape + (size_t)g * fit->m, solution->line, fit->m);
+    return GROOM_OK;
+}
+
+static groom_status solve(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    struct solution solution;
+    groom_status st = solution_init(&solution, fit, context, diag);
+    if (st != GROOM_OK)
+        goto out;
+    double before = loss_of(&solution, context);
+    progress_loss(context, "L_g", 0, before);
+    if ((st = solve_rounds(&solution, context, diag)) != GROOM_OK)
+        goto out;
+    report_loss(&fit->report, "guides", "L_g", before, loss_of(&solution, context));
+    for (uint32_t g = 0; g < fit->n_guides; g++)
+        if (is_sane(&solution, g))
+            points_of(&solution, g, fit->groom->guides + (size_t)g * fit->m);
+    fit->phase = ASSIGN;
+out:
+    solution_finish(&solution, context);
+    return st;
+}
+
+/* --- the stage -------------------------------------------------------------------------------------- */
+
+groom_status guides_step(struct groom_fit *fit, int *ended, const struct groom_context *context,
+                         struct groom_diag *diag)
+{
+    if (fit->phase == SOLVE)
+        return solve(fit, context, diag);
+    return assign_step(fit, ended, context, diag); /* strands have moved: ask again what is in the head */
+}
+
+double guides_fraction(const struct groom_fit *fit) { return 0.7 * fit->phase + 0.3 * fit->iteration / fit->n; }
+
+int guides_sound(const struct groom_fit *fit)
+{
+    return fit->phase < ENDED && fit->iteration < fit->n && (fit->phase == ASSIGN || fit->iteration == 0);
+}
