@@ -81,6 +81,8 @@ struct groom_fit_options {
             double across;  /* pull of neighbours on the scalp, over that of a guide's strands: 3 */
         } guides;
         struct {
+            uint32_t pairs;             /* of neighbouring strands, of which statistics are matched */
+            uint32_t refinements;       /* steps at most; 0 leaves the operators as they are */
             uint32_t iterations;        /* of each loss: 3000 */
             uint32_t alternate;         /* iterations of one loss at a time: 200 */
             double learning_rate;       /* 0.01 */

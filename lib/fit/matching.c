@@ -1,0 +1,271 @@
+#include "fit/matching.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "fit/dense.h"
+#include "groom/strands.h"
+
+#define NEIGHBOURS 8          /* of which a partner is chosen */
+#define DUPLICATE_SHARE 0.01  /* of the usual squared distance to a neighbour: closer ones are duplicates */
+
+struct matching {
+    const struct groom_allocator *allocator;
+    struct groom *groom;              /* of the sub-sample, with random numbers of its own */
+    struct groom_strands *evaluated;  /* its strands, as they come */
+    float (*points)[3];               /* the same resampled as the target was */
+    float (*base)[3], (*guide)[3];
+    float *values;                    /* [n_pairs][MOMENTS_COUNT] */
+    double *cholesky;                 /* of the statistics' covariance */
+    double target[MOMENTS_COUNT];
+    struct moments_plan plan;
+};
+
+static size_t points_of(const struct matching *matching) { return 2 * (size_t)matching->plan.n_pairs * matching->plan.m; }
+
+/* --- pairs ------------------------------------------------------------------------------ */
+
+static int compare_floats(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+/* The nearest neighbour that is no duplicate, else the farthest of those that were found, else the strand. */
+static uint32_t partner_of(uint32_t strand, const uint32_t *ids, const float *squared, float least)
+{
+    uint32_t last = strand;
+    for (int k = 0; k < NEIGHBOURS; k++) {
+        if (ids[k] == UINT32_MAX || ids[k] == strand)
+            continue;
+        last = ids[k];
+        if (squared[k] > least)
+            break;
+    }
+    return last;
+}
+
+/* strand [2 n_pairs]: the first half is set; fills the second. */
+static groom_status choose_partners(const struct groom_fit *fit, uint32_t n_pairs, uint32_t *strand,
+                                    const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    struct groom_neighbours *neighbours = NULL;
+    float (*query)[2] = memory_array(allocator, n_pairs, sizeof *query);
+    uint32_t *ids = memory_array(allocator, n_pairs, NEIGHBOURS * sizeof *ids);
+    float *squared = memory_array(allocator, n_pairs, (NEIGHBOURS + 1) * sizeof *squared), *usual;
+    groom_status st = query && ids && squared ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to pair strands");
+    if (st == GROOM_OK)
+        st = groom_neighbours_create(fit->root_uv[0], fit->n, 2, context, &neighbours, diag);
+    for (uint32_t i = 0; st == GROOM_OK && i < n_pairs; i++)
+        memcpy(query[i], fit->root_uv[strand[i]], sizeof query[i]);
+    if (st == GROOM_OK)
+        st = groom_neighbours_find(neighbours, query[0], n_pairs, NEIGHBOURS, ids, squared, context, diag);
+    if (st == GROOM_OK) {
+        usual = squared + (size_t)n_pairs * NEIGHBOURS;
+        for (uint32_t i = 0; i < n_pairs; i++)
+            usual[i] = squared[(size_t)i * NEIGHBOURS + NEIGHBOURS / 2];
+        qsort(usual, n_pairs, sizeof *usual, compare_floats);
+        float least = (float)DUPLICATE_SHARE * usual[n_pairs / 2];
+        for (uint32_t i = 0; i < n_pairs; i++)
+            strand[n_pairs + i] = partner_of(strand[i], ids + (size_t)i * NEIGHBOURS, squared + (size_t)i * NEIGHBOURS, least);
+    }
+    groom_neighbours_destroy(neighbours);
+    memory_release(allocator, query, n_pairs, sizeof *query);
+    memory_release(allocator, ids, n_pairs, NEIGHBOURS * sizeof *ids);
+    memory_release(allocator, squared, n_pairs, (NEIGHBOURS + 1) * sizeof *squared);
+    return st;
+}
+
+static groom_status choose_pairs(const struct groom_fit *fit, uint32_t n_pairs, uint32_t *strand,
+                                 const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    uint32_t *order = memory_array(allocator, fit->n, sizeof *order);
+    if (!order)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to draw strands");
+    groom_fair_order(fit->n, order);
+    memcpy(strand, order, n_pairs * sizeof *strand);
+    memory_release(allocator, order, fit->n, sizeof *order);
+    return choose_partners(fit, n_pairs, strand, context, diag);
+}
+
+/* --- random numbers ---------------------------------------------------------------------- */
+
+/* The quantile of N(0,1) truncated to [-1,1]. */
+static double truncated_quantile(double probability)
+{
+    double low = -1, high = 1, half = erf(sqrt(0.5));
+    for (int i = 0; i < 40; i++) {
+        double middle = 0.5 * (low + high);
+        if (0.5 + 0.5 * erf(middle * sqrt(0.5)) / half < probability)
+            low = middle;
+        else
+            high = middle;
+    }
+    return 0.5 * (low + high);
+}
+
+struct ranked { float value; uint32_t index; };
+
+static int compare_ranked(const void *a, const void *b)
+{
+    const struct ranked *x = a, *y = b;
+    if (x->value != y->value)
+        return x->value < y->value ? -1 : 1;
+    return (x->index > y->index) - (x->index < y->index);
+}
+
+static groom_status stratify(float *u, uint32_t n, int uniform, const struct groom_allocator *allocator)
+{
+    struct ranked *ranked = memory_array(allocator, n, sizeof *ranked);
+    if (!ranked)
+        return GROOM_ENOMEM;
+    for (uint32_t i = 0; i < n; i++)
+        ranked[i] = (struct ranked){u[i], i};
+    qsort(ranked, n, sizeof *ranked, compare_ranked);
+    for (uint32_t rank = 0; rank < n; rank++) {
+        double probability = (rank + 0.5) / n;
+        u[ranked[rank].index] = (float)(uniform ? probability : truncated_quantile(probability));
+    }
+    memory_release(allocator, ranked, n, sizeof *ranked);
+    return GROOM_OK;
+}
+
+static groom_status stratify_operators(struct groom *groom, const struct groom_allocator *allocator,
+                                       struct groom_diag *diag)
+{
+    for (uint32_t o = 0; o < groom->n_operators; o++) {
+        struct groom_operator *op = &groom->operators[o];
+        uint32_t n_randoms, n = groom_operator_random_per_guide(op->type) ? groom->n_operator_guides : groom->n_strands;
+        const struct groom_operator_random *randoms = groom_operator_randoms(op->type, &n_randoms);
+        groom_draw_random(groom, op, op->seed);
+        for (uint32_t r = 0; r < n_randoms; r++)
+            if (stratify(op->random[r], n, randoms[r].minimum == 0, allocator) != GROOM_OK)
+                return groom_fail(diag, GROOM_ENOMEM, "no memory for random numbers");
+    }
+    return GROOM_OK;
+}
+
+/* --- the sample ---------------------------------------------------------------------------- */
+
+static groom_status allocate(struct matching *matching, const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = matching->allocator;
+    uint32_t n = 2 * matching->plan.n_pairs, m = matching->plan.m;
+    groom_status st = groom_strands_create(n, (uint64_t)n * m, context, &matching->evaluated, diag);
+    if (st != GROOM_OK)
+        return st;
+    for (uint32_t i = 0; i <= n; i++)
+        matching->evaluated->first[i] = i * m;
+    matching->points = memory_array(allocator, points_of(matching), sizeof *matching->points);
+    matching->base = memory_array(allocator, points_of(matching), sizeof *matching->base);
+    matching->guide = memory_array(allocator, points_of(matching), sizeof *matching->guide);
+    matching->values = memory_array(allocator, matching->plan.n_pairs, MOMENTS_COUNT * sizeof *matching->values);
+    matching->cholesky = memory_array(allocator, MOMENTS_COUNT, MOMENTS_COUNT * sizeof *matching->cholesky);
+    if (!matching->points || !matching->base || !matching->guide || !matching->values || !matching->cholesky)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for a sample of %u strands", n);
+    matching->plan.base = (const float (*)[3])matching->base;
+    matching->plan.guide = (const float (*)[3])matching->guide;
+    return GROOM_OK;
+}
+
+static groom_status make_base(struct matching *matching, const struct groom_context *context, struct groom_diag *diag)
+{
+    struct groom *groom = matching->groom;
+    uint32_t m = matching->plan.m, n_operators = groom->n_operators;
+    groom->n_operators = 0; /* for this one evaluation */
+    groom_status st = groom_evaluate(groom, 0, groom->n_strands, matching->base, context, diag);
+    groom->n_operators = n_operators;
+    for (uint32_t i = 0; i < groom->n_strands; i++)
+        memcpy(matching->guide + (size_t)i * m,
+               groom->guides + (size_t)groom->operator_guide[groom->operator_guide_of[i]] * m, m * sizeof *matching->guide);
+    return st == GROOM_OK ? moments_plan_init(&matching->plan, context, diag) : st;
+}
+
+/* The target's statistics and their covariance. */
+static groom_status measure_target(struct matching *matching, const struct groom_fit *fit, const uint32_t *strand, double floor,
+                                   const struct groom_context *context, struct groom_diag *diag)
+{
+    uint32_t m = fit->m, n_pairs = matching->plan.n_pairs;
+    for (uint32_t i = 0; i < 2 * n_pairs; i++)
+        for (uint32_t j = 0; j < m; j++)
+            for (int c = 0; c < 3; c++)
+                matching->points[(size_t)i * m + j][c] =
+                    fit->target[(size_t)strand[i] * m + j][c] * fit->scale + fit->centre[c];
+    for (int round = 0; round < 2; round++) { /* the second with the levels that the first has found */
+        moments_measure(&matching->plan, (const float (*)[3])matching->points, matching->values, context);
+        moments_mean(matching->values, n_pairs, matching->target);
+        memcpy(matching->plan.level, matching->target + MOMENTS_SPECTRUM, sizeof matching->plan.level);
+        matching->plan.centroid = matching->target[MOMENTS_CENTROID];
+    }
+    return moments_covariance(matching->values, n_pairs, matching->groom->operator_guide_of,
+                              matching->groom->n_operator_guides, matching->target, floor, matching->cholesky, context, diag);
+}
+
+groom_status matching_create(const struct groom_fit *fit, uint32_t n_pairs, double floor, const struct groom_context *context,
+                             struct matching **out, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    uint32_t n = n_pairs < fit->n ? n_pairs : fit->n;
+    struct matching *matching = memory_array_zero(allocator, 1, sizeof *matching);
+    uint32_t *strand = memory_array(allocator, n, 2 * sizeof *strand);
+    groom_status st = matching && strand ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to match operators");
+    if (matching) {
+        matching->allocator = allocator;
+        matching->plan.n_pairs = n;
+        matching->plan.m = fit->m;
+    }
+    if (st != GROOM_OK)
+        goto out;
+    if ((st = choose_pairs(fit, n, strand, context, diag)) != GROOM_OK ||
+        (st = groom_select(fit->groom, strand, 2 * n, context, &matching->groom, diag)) != GROOM_OK ||
+        (st = stratify_operators(matching->groom, allocator, diag)) != GROOM_OK ||
+        (st = allocate(matching, context, diag)) != GROOM_OK ||
+        (st = make_base(matching, context, diag)) != GROOM_OK ||
+        (st = measure_target(matching, fit, strand, floor, context, diag)) != GROOM_OK)
+        goto out;
+    *out = matching;
+    matching = NULL;
+out:
+    matching_destroy(matching);
+    memory_release(allocator, strand, n, 2 * sizeof *strand);
+    return st;
+}
+
+void matching_destroy(struct matching *matching)
+{
+    if (!matching)
+        return;
+    const struct groom_allocator *allocator = matching->allocator;
+    size_t n_points = points_of(matching);
+    memory_release(allocator, matching->points, n_points, sizeof *matching->points);
+    memory_release(allocator, matching->base, n_points, sizeof *matching->base);
+    memory_release(allocator, matching->guide, n_points, sizeof *matching->guide);
+    memory_release(allocator, matching->values, matching->plan.n_pairs, MOMENTS_COUNT * sizeof *matching->values);
+    memory_release(allocator, matching->cholesky, MOMENTS_COUNT, MOMENTS_COUNT * sizeof *matching->cholesky);
+    groom_strands_destroy(matching->evaluated);
+    groom_destroy(matching->groom);
+    memory_release(allocator, matching, 1, sizeof *matching);
+}
+
+groom_status matching_residual(struct matching *matching, const struct groom_operator *operators,
+                               double residual[MOMENTS_COUNT], const struct groom_context *context,
+                               struct groom_diag *diag)
+{
+    struct groom *groom = matching->groom;
+    groom_status st;
+    for (uint32_t o = 0; o < groom->n_operators; o++)
+        memcpy(groom->operators[o].parameter, operators[o].parameter, sizeof operators[o].parameter);
+    if ((st = groom_evaluate(groom, 0, groom->n_strands, matching->evaluated->points, context, diag)) != GROOM_OK ||
+        (st = groom_strands_resample(matching->evaluated, matching->plan.m, matching->points, context, diag)) != GROOM_OK)
+        return st;
+    moments_measure(&matching->plan, (const float (*)[3])matching->points, matching->values, context);
+    moments_mean(matching->values, matching->plan.n_pairs, residual);
+    for (int f = 0; f < MOMENTS_COUNT; f++)
+        residual[f] -= matching->target[f];
+    dense_forward(matching->cholesky, MOMENTS_COUNT, residual);
+    return GROOM_OK;
+}

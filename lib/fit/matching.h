@@ -1,0 +1,32 @@
+/* A sub-sample of a fit's strands, and how well the groom's operators match the target on it. */
+#ifndef FIT_MATCHING_H
+#define FIT_MATCHING_H
+
+#include "fit/moments.h"
+#include "fit/state.h"
+
+struct matching;
+
+/* Pairs of neighbouring strands: strands drawn fairly, each with its nearest neighbour on the scalp that is
+ * no duplicate of it. The groom's random numbers are replaced by the quantiles of their ranks, so that what
+ * is simulated has the spread that the operators mean, not that of one draw; they stay the same for all
+ * parameters (common random numbers). A function of the fit's state alone.
+ * n_pairs  wanted; at most as many as there are strands
+ * floor    of the statistics' standard deviations: moments_covariance
+ * returns  GROOM_OK, GROOM_ENOMEM. Owned by the caller */
+GROOM_MUST_CHECK groom_status matching_create(const struct groom_fit *fit, uint32_t n_pairs, double floor,
+                                              const struct groom_context *context, struct matching **matching,
+                                              struct groom_diag *diag);
+void matching_destroy(struct matching *matching); /* takes NULL */
+
+/* How far the statistics of the groom with these operators are from the target's, as independent numbers
+ * of variance 1 where the operators are right (with guides that are right, too).
+ * operators  of the fit's groom, of which the parameters are read
+ * residual   [MOMENTS_COUNT] out
+ * returns    GROOM_OK, GROOM_ENOMEM
+ * threads    same bits for any pool */
+GROOM_MUST_CHECK groom_status matching_residual(struct matching *matching, const struct groom_operator *operators,
+                                                double residual[MOMENTS_COUNT], const struct groom_context *context,
+                                                struct groom_diag *diag);
+
+#endif

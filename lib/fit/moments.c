@@ -1,0 +1,410 @@
+#include "fit/moments.h"
+
+#include <cblas.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "fit/blas.h"
+#include "fit/dense.h"
+
+#define PI 3.14159265358979323846
+#define PAIRS_PER_PIECE 16
+#define N_FREQ MOMENTS_FREQUENCIES
+#define LEAST_TURNS 1.5         /* of a strand, at the lowest frequency */
+#define MOST_TURNS 40.0         /* at the highest */
+#define LEAST_LOCAL_TURNS 4.5   /* of a strand, in a third */
+#define NYQUIST_SHARE 0.45      /* of a turn a segment */
+#define POWER_FLOOR 1e-8        /* of squared segments: a wobble of 1e-4 rad */
+#define DISTANCE_FLOOR 1e-8     /* of squared lengths */
+#define SHRINKAGE 0.1           /* of correlations */
+#define GUIDE_FLOOR 3.0         /* times the floor, for statistics that lean on base strands and operator guides */
+
+/* --- the plan ------------------------------------------------------------------------ */
+
+static double squared(const float a[3], const float b[3])
+{
+    double x = (double)a[0] - b[0], y = (double)a[1] - b[1], z = (double)a[2] - b[2];
+    return x * x + y * y + z * z;
+}
+
+/* Through a dozen of its vertices, so that waves count little. */
+static double coarse_length(const float (*points)[3], uint32_t m)
+{
+    double sum = 0;
+    uint32_t n = m - 1 < 12 ? m - 1 : 12, last = 0;
+    for (uint32_t s = 1; s <= n; s++) {
+        uint32_t j = (uint32_t)((uint64_t)s * (m - 1) / n);
+        sum += sqrt(squared(points[j], points[last]));
+        last = j;
+    }
+    return sum;
+}
+
+static double full_length(const float (*points)[3], uint32_t m)
+{
+    double sum = 0;
+    for (uint32_t j = 1; j < m; j++)
+        sum += sqrt(squared(points[j], points[j - 1]));
+    return sum;
+}
+
+static uint32_t place(uint32_t p, uint32_t m) { return (uint32_t)((uint64_t)(p + 1) * (m - 1) / MOMENTS_PLACES); }
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double median(double *values, uint32_t n)
+{
+    qsort(values, n, sizeof *values, compare_doubles);
+    return values[n / 2];
+}
+
+groom_status moments_plan_init(struct moments_plan *plan, const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    uint32_t n = plan->n_pairs, m = plan->m, middle = m / 2;
+    double *values = memory_array(allocator, 2 * (size_t)n, sizeof *values);
+    if (!values)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to compare %u pairs of strands", n);
+    for (uint32_t i = 0; i < 2 * n; i++)
+        values[i] = full_length(plan->base + (size_t)i * m, m);
+    double length = fmax(median(values, 2 * n), 1e-9);
+    for (uint32_t i = 0; i < n; i++)
+        values[i] = squared(plan->base[(size_t)i * m + middle], plan->base[(size_t)(n + i) * m + middle]);
+    plan->apart = fmax(median(values, n), DISTANCE_FLOOR * length * length);
+    for (uint32_t i = 0; i < 2 * n; i++)
+        values[i] = squared(plan->base[(size_t)i * m + middle], plan->guide[(size_t)i * m + middle]);
+    plan->off_guide = fmax(median(values, 2 * n), DISTANCE_FLOOR * length * length);
+    for (int q = 0; q < N_FREQ; q++)
+        plan->frequency[q] = LEAST_TURNS / length * pow(MOST_TURNS / LEAST_TURNS, (double)q / (N_FREQ - 1));
+    memset(plan->level, 0, sizeof plan->level);
+    plan->centroid = 0;
+    memory_release(allocator, values, 2 * (size_t)n, sizeof *values);
+    return GROOM_OK;
+}
+
+/* --- spectra ---------------------------------------------------------------------------- */
+
+/* Transforms of a strand's segments: over the whole, then over each third. */
+struct spectrum { float re[1 + MOMENTS_WINDOWS][3][N_FREQ], im[1 + MOMENTS_WINDOWS][3][N_FREQ]; };
+
+/* Hann's window from `from` to `to`; 0 outside. */
+static float hann(double at, double from, double to)
+{
+    return at <= from || at >= to ? 0 : (float)(0.5 - 0.5 * cos(2 * PI * (at - from) / (to - from)));
+}
+
+struct windows { float weight[MOMENTS_MOST_VERTICES][1 + MOMENTS_WINDOWS]; };
+
+static void make_windows(uint32_t m, struct windows *windows)
+{
+    for (uint32_t j = 0; j + 1 < m; j++) {
+        double v = (j + 0.5) / (m - 1);
+        windows->weight[j][0] = hann(v, 0, 1);
+        for (int w = 0; w < MOMENTS_WINDOWS; w++)
+            windows->weight[j][1 + w] = hann(v, w / 6.0, w / 6.0 + 1 / 3.0);
+    }
+}
+
+/* Segments of both strands of a pair at the same turns a segment, so that their difference means something. */
+static void transform(const struct windows *windows, const float (*points)[3], uint32_t m, const double turns[N_FREQ],
+                      struct spectrum *spectrum)
+{
+    float cosine[N_FREQ], sine[N_FREQ], step_cosine[N_FREQ], step_sine[N_FREQ];
+    memset(spectrum, 0, sizeof *spectrum);
+    for (int q = 0; q < N_FREQ; q++) {
+        cosine[q] = 1, sine[q] = 0;
+        step_cosine[q] = (float)cos(2 * PI * turns[q]);
+        step_sine[q] = (float)sin(2 * PI * turns[q]);
+    }
+    for (uint32_t j = 0; j + 1 < m; j++) {
+        const float *weight = windows->weight[j];
+        for (int w = 0; w < 1 + MOMENTS_WINDOWS; w++) {
+            if (weight[w] == 0)
+                continue;
+            for (int c = 0; c < 3; c++) {
+                float e = weight[w] * (points[j + 1][c] - points[j][c]);
+                for (int q = 0; q < N_FREQ; q++) {
+                    spectrum->re[w][c][q] += cosine[q] * e;
+                    spectrum->im[w][c][q] += sine[q] * e;
+                }
+            }
+        }
+        for (int q = 0; q < N_FREQ; q++) {
+            float next = cosine[q] * step_cosine[q] - sine[q] * step_sine[q];
+            sine[q] = sine[q] * step_cosine[q] + cosine[q] * step_sine[q];
+            cosine[q] = next;
+        }
+    }
+}
+
+/* Power in window w at frequency q over that of a straight strand of the same length. */
+static double power(const struct spectrum *a, const struct spectrum *b, int w, int q, double straight)
+{
+    double sum = 0;
+    for (int c = 0; c < 3; c++) {
+        double re = (double)a->re[w][c][q] - (b ? b->re[w][c][q] : 0), im = (double)a->im[w][c][q] - (b ? b->im[w][c][q] : 0);
+        sum += re * re + im * im;
+    }
+    return sum / (straight * straight);
+}
+
+/* The mean logarithm of the frequency, weighed by power. */
+static double centroid_of(const struct moments_plan *plan, const struct spectrum *s, const int use[N_FREQ])
+{
+    double sum = 0, all = 0;
+    for (int q = 3; q < N_FREQ; q++) {
+        if (!use[q])
+            continue;
+        double p = power(s, NULL, 0, q, 1);
+        sum += p * log(plan->frequency[q] / plan->frequency[0]);
+        all += p;
+    }
+    return all > 0 ? sum / all : 0;
+}
+
+static void measure_spectra(const struct moments_plan *plan, const struct windows *windows, const float (*a)[3],
+                            const float (*b)[3], double length, float *out)
+{
+    struct spectrum of_a, of_b;
+    uint32_t m = plan->m;
+    double turns[N_FREQ], straight = length / 2, third = length / 6;
+    int use[N_FREQ];
+    for (int q = 0; q < N_FREQ; q++) {
+        double f = plan->frequency[q] * length;
+        turns[q] = f / (m - 1);
+        use[q] = f >= LEAST_TURNS && turns[q] <= NYQUIST_SHARE;
+    }
+    transform(windows, a, m, turns, &of_a);
+    transform(windows, b, m, turns, &of_b);
+    for (int q = 0; q < N_FREQ; q++) {
+        if (!use[q])
+            continue;
+        double log_a = log(power(&of_a, NULL, 0, q, straight) + POWER_FLOOR);
+        double log_b = log(power(&of_b, NULL, 0, q, straight) + POWER_FLOOR);
+        out[MOMENTS_SPECTRUM + q] = (float)(0.5 * (log_a + log_b));
+        out[MOMENTS_SPREAD + q] = (float)(0.5 * (fabs(log_a - plan->level[q]) + fabs(log_b - plan->level[q])));
+        out[MOMENTS_COHERENCE + q] = (float)log(power(&of_a, &of_b, 0, q, straight) + POWER_FLOOR);
+    }
+    for (int w = 0; w < MOMENTS_WINDOWS; w++)
+        for (int k = 0; k < MOMENTS_COARSE; k++) {
+            int q = 2 * k + 1, at = w * MOMENTS_COARSE + k;
+            if (!use[q] || turns[q] * (m - 1) < LEAST_LOCAL_TURNS)
+                continue;
+            out[MOMENTS_LOCAL + at] = (float)(0.5 * (log(power(&of_a, NULL, 1 + w, q, third) + POWER_FLOOR) +
+                                                     log(power(&of_b, NULL, 1 + w, q, third) + POWER_FLOOR)));
+            out[MOMENTS_LOCAL_COHERENCE + at] = (float)log(power(&of_a, &of_b, 1 + w, q, third) + POWER_FLOOR);
+        }
+    double f_a = centroid_of(plan, &of_a, use), f_b = centroid_of(plan, &of_b, use);
+    out[MOMENTS_CENTROID] = (float)(0.5 * (f_a + f_b));
+    out[MOMENTS_CENTROID + 1] = (float)(0.5 * (fabs(f_a - plan->centroid) + fabs(f_b - plan->centroid)));
+    out[MOMENTS_CENTROID + 2] = (float)fabs(f_a - f_b);
+}
+
+/* --- lengths and distances ------------------------------------------------------------------- */
+
+static void measure_lengths(const float (*a)[3], const float (*b)[3], const float (*base_a)[3],
+                            const float (*base_b)[3], uint32_t m, float *out)
+{
+    double least = 1e-9;
+    double coarse_a = log(fmax(coarse_length(a, m), least) / fmax(coarse_length(base_a, m), least));
+    double coarse_b = log(fmax(coarse_length(b, m), least) / fmax(coarse_length(base_b, m), least));
+    double full_a = log(fmax(full_length(a, m), least) / fmax(full_length(base_a, m), least));
+    double full_b = log(fmax(full_length(b, m), least) / fmax(full_length(base_b, m), least));
+    out[MOMENTS_LENGTH] = (float)(0.5 * (coarse_a + coarse_b));
+    out[MOMENTS_LENGTH + 1] = (float)fabs(coarse_a - coarse_b);
+    out[MOMENTS_LENGTH + 2] = (float)(0.5 * (full_a + full_b));
+    out[MOMENTS_LENGTH + 3] = (float)fabs(full_a - full_b);
+}
+
+/* How much of the distance from q to p is left of that from base_q to base_p: about 1 - a' under a
+ * clump. `scale` keeps it small where those are close. */
+static double share_left(const float p[3], const float q[3], const float base_p[3], const float base_q[3], double scale)
+{
+    double dot = 0, square = 0;
+    for (int c = 0; c < 3; c++) {
+        double base = (double)base_p[c] - base_q[c];
+        dot += ((double)p[c] - q[c]) * base;
+        square += base * base;
+    }
+    return dot / (square + scale);
+}
+
+/* Where a strand is at a place against its base strand: as a part of the base strand's chord, and off it. */
+static double off_base(const float x[3], const float base[3], const float root[3], double length, double aside[3])
+{
+    double dot = 0, square = 1e-6 * length * length;
+    for (int c = 0; c < 3; c++) {
+        double chord = (double)base[c] - root[c];
+        dot += ((double)x[c] - base[c]) * chord;
+        square += chord * chord;
+    }
+    for (int c = 0; c < 3; c++)
+        aside[c] = (double)x[c] - base[c] - dot / square * ((double)base[c] - root[c]);
+    return dot / square;
+}
+
+static void measure_stretch(const struct moments_plan *plan, uint32_t pair, const float (*points)[3], double length,
+                            float *out)
+{
+    uint32_t m = plan->m;
+    size_t first_a = (size_t)pair * m, first_b = (size_t)(plan->n_pairs + pair) * m;
+    for (uint32_t p = 0; p < MOMENTS_PLACES; p++) {
+        size_t a = first_a + place(p, m), b = first_b + place(p, m);
+        double aside_a[3], aside_b[3], square = DISTANCE_FLOOR * length * length;
+        double along_a = off_base(points[a], plan->base[a], plan->base[first_a], length, aside_a);
+        double along_b = off_base(points[b], plan->base[b], plan->base[first_b], length, aside_b);
+        for (int c = 0; c < 3; c++)
+            square += (aside_a[c] - aside_b[c]) * (aside_a[c] - aside_b[c]);
+        out[MOMENTS_STRETCH + p] = (float)fmin(fabs(along_a - along_b), 2);
+        out[MOMENTS_ASIDE + p] = (float)log(square);
+    }
+}
+
+static void measure_distances(const struct moments_plan *plan, uint32_t pair, const float (*points)[3], double length,
+                              float *out)
+{
+    uint32_t m = plan->m;
+    size_t first_a = (size_t)pair * m, first_b = (size_t)(plan->n_pairs + pair) * m;
+    double floor = DISTANCE_FLOOR * length * length;
+    for (uint32_t p = 0; p < MOMENTS_PLACES; p++) {
+        size_t a = first_a + place(p, m), b = first_b + place(p, m);
+        const float *x = points[a], *y = points[b], *g = plan->guide[a], *h = plan->guide[b];
+        out[MOMENTS_DISTANCE + p] = (float)log(squared(x, y) + floor);
+        out[MOMENTS_ALONG + p] = (float)share_left(x, y, plan->base[a], plan->base[b], plan->apart);
+        out[MOMENTS_GUIDE_DISTANCE + p] = (float)(0.5 * (log(squared(x, g) + floor) + log(squared(y, h) + floor)));
+        out[MOMENTS_GUIDE_ALONG + p] = (float)(0.5 * (share_left(x, g, plan->base[a], g, plan->off_guide) +
+                                                      share_left(y, h, plan->base[b], h, plan->off_guide)));
+    }
+}
+
+/* --- all -------------------------------------------------------------------------------------- */
+
+struct measuring {
+    const struct moments_plan *plan;
+    const float (*points)[3];
+    float *values;
+};
+
+static void measure_pair(const struct measuring *job, const struct windows *windows, uint32_t pair)
+{
+    const struct moments_plan *plan = job->plan;
+    uint32_t m = plan->m;
+    size_t a = (size_t)pair * m, b = (size_t)(plan->n_pairs + pair) * m;
+    float *out = job->values + (size_t)pair * MOMENTS_COUNT;
+    double length = full_length(plan->base + a, m);
+    for (int f = 0; f < MOMENTS_COUNT; f++)
+        out[f] = NAN;
+    if (!(length > 0))
+        return;
+    measure_spectra(plan, windows, job->points + a, job->points + b, length, out);
+    measure_lengths(job->points + a, job->points + b, plan->base + a, plan->base + b, m, out);
+    measure_stretch(plan, pair, job->points, length, out);
+    measure_distances(plan, pair, job->points, length, out);
+}
+
+static void measure_piece(void *user, uint32_t piece, uint32_t thread)
+{
+    const struct measuring *job = user;
+    struct windows windows;
+    (void)thread;
+    make_windows(job->plan->m, &windows);
+    for (uint32_t i = piece * PAIRS_PER_PIECE; i < job->plan->n_pairs && i < (piece + 1) * PAIRS_PER_PIECE; i++)
+        measure_pair(job, &windows, i);
+}
+
+void moments_measure(const struct moments_plan *plan, const float (*points)[3], float *values,
+                     const struct groom_context *context)
+{
+    struct measuring job = {plan, points, values};
+    parallel_for(context, plan->n_pairs / PAIRS_PER_PIECE + 1, measure_piece, &job);
+}
+
+void moments_mean(const float *values, uint32_t n_pairs, double mean[MOMENTS_COUNT])
+{
+    uint32_t n[MOMENTS_COUNT] = {0};
+    for (int f = 0; f < MOMENTS_COUNT; f++)
+        mean[f] = 0;
+    for (uint32_t i = 0; i < n_pairs; i++)
+        for (int f = 0; f < MOMENTS_COUNT; f++) {
+            float value = values[(size_t)i * MOMENTS_COUNT + f];
+            if (!isnan(value)) {
+                mean[f] += value;
+                n[f]++;
+            }
+        }
+    for (int f = 0; f < MOMENTS_COUNT; f++)
+        mean[f] = n[f] > 0 ? mean[f] / n[f] : 0;
+}
+
+/* --- covariance ----------------------------------------------------------------------------------- */
+
+static int is_deviation(int f)
+{
+    return f == MOMENTS_CENTROID + 1 || f == MOMENTS_CENTROID + 2 || f == MOMENTS_LENGTH + 1 || f == MOMENTS_LENGTH + 3 ||
+           (f >= MOMENTS_STRETCH && f < MOMENTS_ASIDE);
+}
+
+static int leans_on_guides(int f) { return f >= MOMENTS_ALONG || f == MOMENTS_LENGTH || f == MOMENTS_LENGTH + 2; }
+
+/* Variances of the means from sums over bundles; values become deviations of standard size. */
+static void standardize(float *values, uint32_t n_pairs, const uint32_t *bundle, uint32_t n_bundles,
+                        const double mean[MOMENTS_COUNT], double *sums, double variance[MOMENTS_COUNT])
+{
+    for (int f = 0; f < MOMENTS_COUNT; f++) {
+        double square = 0, of_bundles = 0;
+        uint32_t n = 0;
+        memset(sums, 0, n_bundles * sizeof *sums);
+        for (uint32_t i = 0; i < n_pairs; i++) {
+            float *value = &values[(size_t)i * MOMENTS_COUNT + f];
+            n += !isnan(*value);
+            *value = isnan(*value) ? 0 : (float)(*value - mean[f]);
+            square += (double)*value * *value;
+            sums[bundle[i]] += *value;
+        }
+        for (uint32_t b = 0; b < n_bundles; b++)
+            of_bundles += sums[b] * sums[b];
+        variance[f] = n > 0 ? fmax(of_bundles, square) / ((double)n * n) : 1e6;
+        float scale = square > 0 ? (float)(1 / sqrt(square)) : 0;
+        for (uint32_t i = 0; i < n_pairs; i++)
+            values[(size_t)i * MOMENTS_COUNT + f] *= scale;
+    }
+}
+
+groom_status moments_covariance(float *values, uint32_t n_pairs, const uint32_t *bundle, uint32_t n_bundles,
+                                const double mean[MOMENTS_COUNT], double floor, double *cholesky,
+                                const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    int n = MOMENTS_COUNT;
+    double variance[MOMENTS_COUNT];
+    double *sums = memory_array(allocator, n_bundles, sizeof *sums);
+    float *correlation = memory_array(allocator, (size_t)n * (size_t)n, sizeof *correlation);
+    groom_status st = GROOM_OK;
+    if (!sums || !correlation) {
+        st = groom_fail(diag, GROOM_ENOMEM, "no memory for the covariance of %d statistics", n);
+        goto out;
+    }
+    blas_prepare();
+    standardize(values, n_pairs, bundle, n_bundles, mean, sums, variance);
+    cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, n, n, (int)n_pairs, 1, values, n, values, n, 0, correlation, n);
+    for (int f = 0; f < n; f++)
+        for (int g = 0; g <= f; g++) {
+            double *c = &cholesky[(size_t)f * (size_t)n + (size_t)g];
+            *c = (1 - SHRINKAGE) * (double)correlation[(size_t)f * (size_t)n + (size_t)g] * sqrt(variance[f] * variance[g]);
+            if (f == g)
+                *c = variance[f] + pow(floor * (leans_on_guides(f) ? GUIDE_FLOOR : 1) * (is_deviation(f) ? mean[f] : 1), 2) + 1e-12;
+        }
+    if (!dense_cholesky(cholesky, (uint32_t)n))
+        st = groom_fail(diag, GROOM_EINTERNAL, "the covariance of the strands' statistics is not positive definite");
+out:
+    memory_release(allocator, sums, n_bundles, sizeof *sums);
+    memory_release(allocator, correlation, (size_t)n * (size_t)n, sizeof *correlation);
+    return st;
+}

@@ -1,0 +1,89 @@
+/* Statistics of strands that tell the operators' parameters apart.
+ *
+ * The losses of Chang et al. 2025, Section 5.5, hardly see some parameters (their notes: scale and
+ * clump) and mix up others. What is compared here instead are means, over pairs of neighbouring
+ * strands, of some 180 numbers a pair, each of which answers to few parameters:
+ *
+ *   spectra     logarithms of the power of a strand's segments at fixed turns per metre of its base
+ *               strand, over the whole strand and over thirds: curl and frizz, and where they set in
+ *   coherence   the same of the difference between the two strands of a pair: curls that share an
+ *               operator guide cancel, frizz does not, and what scale and bend tell apart stays
+ *   spread      mean absolute deviations of the spectra, the strands' mean frequency, and its
+ *               difference within pairs: random frequency
+ *   lengths     against the base strand, and their difference within pairs: scale
+ *   stretch     how differently the strands of a pair have left their base strands, at six places: along
+ *               them (scale) and aside (bend); what is wrong with the guides cancels
+ *   distances   between the strands of a pair at six places, in size and along the distance of their
+ *               base strands; the same to the operator guide: clump
+ *
+ * Logarithms and absolute deviations keep a few odd strands from deciding. Nothing depends on the unit. */
+#ifndef FIT_MOMENTS_H
+#define FIT_MOMENTS_H
+
+#include <stdint.h>
+
+#include "groom/context.h"
+#include "groom/diag.h"
+
+#define MOMENTS_FREQUENCIES 16 /* of the whole strand */
+#define MOMENTS_COARSE 8       /* of a third */
+#define MOMENTS_WINDOWS 5      /* thirds that overlap by half */
+#define MOMENTS_PLACES 6
+#define MOMENTS_MOST_VERTICES 1000
+
+enum moments_index {
+    MOMENTS_SPECTRUM,
+    MOMENTS_SPREAD = MOMENTS_SPECTRUM + MOMENTS_FREQUENCIES,
+    MOMENTS_COHERENCE = MOMENTS_SPREAD + MOMENTS_FREQUENCIES,
+    MOMENTS_LOCAL = MOMENTS_COHERENCE + MOMENTS_FREQUENCIES,
+    MOMENTS_LOCAL_COHERENCE = MOMENTS_LOCAL + MOMENTS_WINDOWS * MOMENTS_COARSE,
+    MOMENTS_CENTROID = MOMENTS_LOCAL_COHERENCE + MOMENTS_WINDOWS * MOMENTS_COARSE,
+    MOMENTS_LENGTH = MOMENTS_CENTROID + 3,
+    MOMENTS_DISTANCE = MOMENTS_LENGTH + 4,
+    MOMENTS_STRETCH = MOMENTS_DISTANCE + MOMENTS_PLACES,
+    MOMENTS_ASIDE = MOMENTS_STRETCH + MOMENTS_PLACES,
+    MOMENTS_ALONG = MOMENTS_ASIDE + MOMENTS_PLACES,
+    MOMENTS_GUIDE_DISTANCE = MOMENTS_ALONG + MOMENTS_PLACES,
+    MOMENTS_GUIDE_ALONG = MOMENTS_GUIDE_DISTANCE + MOMENTS_PLACES,
+    MOMENTS_COUNT = MOMENTS_GUIDE_ALONG + MOMENTS_PLACES
+};
+
+/* What strands are compared against: fixed while parameters change. Pairs are strands i and n_pairs + i. */
+struct moments_plan {
+    uint32_t n_pairs, m;        /* m at most MOMENTS_MOST_VERTICES */
+    const float (*base)[3];   /* [2 n_pairs][m] strands without operators */
+    const float (*guide)[3];  /* [2 n_pairs][m] their operator guides */
+    double frequency[MOMENTS_FREQUENCIES]; /* turns per metre, or of whatever unit the points have */
+    double apart, off_guide;  /* median squared distances of base strands: of pairs, from operator guides */
+    double level[MOMENTS_FREQUENCIES];     /* of the target's spectrum, from which spread is measured */
+    double centroid;                       /* of the target */
+};
+
+/* Fills frequency, apart and off_guide from base and guide; level and centroid are 0.
+ * returns  GROOM_OK, GROOM_ENOMEM */
+GROOM_MUST_CHECK groom_status moments_plan_init(struct moments_plan *plan, const struct groom_context *context,
+                                                struct groom_diag *diag);
+
+/* The statistics of each pair: values [n_pairs][MOMENTS_COUNT]; NAN where a pair has nothing to say,
+ * which depends on its base strands alone.
+ * points   [2 n_pairs][m][3]
+ * threads  same bits for any pool */
+void moments_measure(const struct moments_plan *plan, const float (*points)[3], float *values,
+                     const struct groom_context *context);
+
+/* Means over pairs, NANs left out; 0 where there is nothing but NANs. */
+void moments_mean(const float *values, uint32_t n_pairs, double mean[MOMENTS_COUNT]);
+
+/* The covariance of the means, of which bundles are the independent draws: per-pair correlations, shrunk,
+ * with variances of sums over bundles and a floor, as its Cholesky factor.
+ * floor     how finely the model is taken to tell a statistic, as a standard deviation: of logarithms and
+ *           shares as it is, of absolute deviations as a part of them
+ * values    [n_pairs][MOMENTS_COUNT]; NANs become the mean
+ * bundle    [n_pairs] 0..n_bundles-1
+ * cholesky  [MOMENTS_COUNT][MOMENTS_COUNT] lower triangle
+ * returns   GROOM_OK, GROOM_ENOMEM, GROOM_EINTERNAL (not positive definite: cannot be) */
+GROOM_MUST_CHECK groom_status moments_covariance(float *values, uint32_t n_pairs, const uint32_t *bundle,
+                                                 uint32_t n_bundles, const double mean[MOMENTS_COUNT], double floor,
+                                                 double *cholesky,                                                 const struct groom_context *context, struct groom_diag *diag);
+
+#endif

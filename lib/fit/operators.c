@@ -1,0 +1,522 @@
+/* Stage `operators`: the operators' parameters (Chang et al. 2025, Section 5.5, reached another way).
+ *
+ * The paper descends its losses with Adam, 9 000 steps that alternate between shape, scale and clump;
+ * they see some parameters too little and others not apart (loss_*.h and moments.h say which). Here all
+ * parameters are found at once, so that none can take what belongs to another: on a sub-sample with
+ * common random numbers, they are moved until some 180 statistics of the strands agree with the target's
+ * (moments.h), by their covariance. First the frequencies look around for a better valley, then Levenberg and
+ * Marquardt's steps go down it. The statistics begin as coarse ones, of which the large differences decide,
+ * and are taken more finely from step to step. The paper's losses, before and after, are the yardstick. */
+#include <math.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/progress.h"
+#include "fit/dense.h"
+#include "fit/loss_determinant.h"
+#include "fit/loss_wasserstein.h"
+#include "fit/matching.h"
+#include "groom/strands.h"
+
+enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
+
+#define STREAM_SLICES 0x66690011u  /* and the one after it */
+#define STREAM_BATCHES 0x66690013u
+
+#define UNIT 0.1               /* metres on an ordinary head: what the paper's weights were made for */
+#define LOSS_STRANDS 1500      /* compared by the shape losses */
+#define LEAST_LOGARITHM 1e-3   /* of a parameter's initial value: as good as 0 */
+#define LEAST_START 0.3        /* of a parameter's initial value, to begin with: below, it hardly shows */
+#define LEAST_RANDOM 1.0       /* of one that scales a random number: the effect goes with its square */
+#define FLOOR_FIRST 0.3        /* of the statistics in the first step, and how it falls to the last */
+#define FLOOR_RATIO 0.5
+#define FLOOR_LAST 0.01
+#define PROBE 0.03             /* step of a finite difference, in logarithms or fractions of a strand */
+#define LONGEST_STEP 0.7       /* of a parameter in one step of refinement */
+#define LONGEST_START 0.2      /* the same of where a bend or curl sets in */
+#define DAMPING_FLOOR 0.1      /* keeps parameters that nothing speaks for where they are */
+#define CONVERGED 1e-3         /* share of the misfit that a step must gain */
+#define MOST_PARAMETERS (GROOM_FIT_MAX_OPERATORS * GROOM_OPERATOR_MAX_PARAMETERS)
+
+/* --- parameters --------------------------------------------------------------------------- */
+
+/* A number that is fitted: sizes as logarithms, places along the strand as they are. */
+struct unknown {
+    float *value;
+    double minimum, maximum, initial;
+    int logarithmic;
+    int frequency, random;
+};
+
+/* What a parameter's initial value in metres is on a head of this size. */
+static double initial_of(const struct groom_operator_parameter *parameter, double ordinary)
+{
+    if (strcmp(parameter->unit, "m") == 0)
+        return parameter->initial * ordinary;
+    return strcmp(parameter->unit, "1/m") == 0 ? parameter->initial / ordinary : parameter->initial;
+}
+
+static uint32_t list_unknowns(struct groom_operator *operators, uint32_t n_operators, double ordinary,
+                              struct unknown *unknowns)
+{
+    uint32_t n = 0, n_parameters;
+    for (uint32_t o = 0; o < n_operators; o++) {
+        const struct groom_operator_parameter *p = groom_operator_parameters(operators[o].type, &n_parameters);
+        for (uint32_t k = 0; operators[o].enabled && k < n_parameters; k++) {
+            int place = p[k].slider_maximum <= 1 && strcmp(p[k].name, "start") == 0;
+            double initial = initial_of(&p[k], ordinary);
+            unknowns[n++] = (struct unknown){&operators[o].parameter[k],
+                                             place ? p[k].minimum : fmax(p[k].minimum, LEAST_LOGARITHM * initial),
+                                             p[k].maximum, initial, !place,
+                                             strcmp(p[k].name, "frequency") == 0,
+                                             strncmp(p[k].name, "random", 6) == 0};
+        }
+    }
+    return n;
+}
+
+static double read_unknown(const struct unknown *unknown)
+{
+    return unknown->logarithmic ? log(fmax(*unknown->value, unknown->minimum)) : *unknown->value;
+}
+
+static void write_unknown(const struct unknown *unknown, double x)
+{
+    double value = unknown->logarithmic ? exp(x) : x;
+    *unknown->value = (float)fmin(fmax(value, unknown->minimum), unknown->maximum);
+}
+
+/* The fit's operators with parameters of their own, to be tried. */
+struct trial {
+    struct groom_operator operators[GROOM_FIT_MAX_OPERATORS];
+    struct unknown unknowns[MOST_PARAMETERS];
+    uint32_t n_operators, n_unknowns;
+};
+
+static void trial_init(const struct groom_fit *fit, struct trial *trial)
+{
+    trial->n_operators = fit->groom->n_operators;
+    memcpy(trial->operators, fit->groom->operators, trial->n_operators * sizeof *trial->operators);
+    trial->n_unknowns = list_unknowns(trial->operators, trial->n_operators, fit->ordinary, trial->unknowns);
+}
+
+static void trial_keep(const struct trial *trial, struct groom_fit *fit)
+{
+    for (uint32_t o = 0; o < trial->n_operators; o++)
+        memcpy(fit->groom->operators[o].parameter, trial->operators[o].parameter, sizeof trial->operators[o].parameter);
+}
+
+static uint32_t count_unknowns(const struct groom_fit *fit)
+{
+    struct trial trial;
+    trial_init(fit, &trial);
+    return trial.n_unknowns;
+}
+
+/* --- the misfit ------------------------------------------------------------------------------ */
+
+static double square_of(const double residual[MOMENTS_COUNT])
+{
+    double sum = 0;
+    for (int f = 0; f < MOMENTS_COUNT; f++)
+        sum += residual[f] * residual[f];
+    return sum;
+}
+
+static groom_status misfit(struct matching *matching, const struct trial *trial, double *square,
+                           const struct groom_context *context, struct groom_diag *diag)
+{
+    double residual[MOMENTS_COUNT] = {0};
+    *square = INFINITY;
+    if (progress_cancelled(context))
+        return groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage operators");
+    groom_status st = matching_residual(matching, trial->operators, residual, context, diag);
+    *square = square_of(residual);
+    return st;
+}
+
+/* --- search ------------------------------------------------------------------------------------ */
+
+/* Other values of one parameter, in logarithms or fractions of a strand. */
+static groom_status search_one(struct matching *matching, struct trial *trial, uint32_t index, double *square,
+                               const struct groom_context *context, struct groom_diag *diag)
+{
+    static const double ratios[] = {-1.0, -0.5, 0.5, 1.0}, shifts[] = {-0.3, -0.15, 0.15, 0.3};
+    const struct unknown *unknown = &trial->unknowns[index];
+    double start = read_unknown(unknown), best = start;
+    for (int k = 0; k < 4; k++) {
+        double other, x = start + (unknown->logarithmic ? ratios[k] : shifts[k]);
+        write_unknown(unknown, x);
+        groom_status st = misfit(matching, trial, &other, context, diag);
+        if (st != GROOM_OK)
+            return st;
+        if (other < *square) {
+            *square = other;
+            best = x;
+        }
+    }
+    write_unknown(unknown, best);
+    return GROOM_OK;
+}
+
+/* --- refinement ---------------------------------------------------------------------------------- */
+
+/* The misfit's slope for each unknown. jacobian [n_unknowns][MOMENTS_COUNT] */
+static groom_status differentiate(struct matching *matching, struct trial *trial, const double residual[MOMENTS_COUNT],
+                                  double *jacobian, const struct groom_context *context, struct groom_diag *diag)
+{
+    for (uint32_t k = 0; k < trial->n_unknowns; k++) {
+        const struct unknown *unknown = &trial->unknowns[k];
+        double *column = jacobian + (size_t)k * MOMENTS_COUNT, x = read_unknown(unknown), step;
+        float kept = *unknown->value;
+        if (progress_cancelled(context))
+            return groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage operators");
+        write_unknown(unknown, x + PROBE);
+        if (read_unknown(unknown) <= x) /* at its end: look the other way */
+            write_unknown(unknown, x - PROBE);
+        step = read_unknown(unknown) - x;
+        groom_status st = matching_residual(matching, trial->operators, column, context, diag);
+        *unknown->value = kept;
+        if (st != GROOM_OK)
+            return st;
+        for (int f = 0; f < MOMENTS_COUNT; f++)
+            column[f] = step != 0 ? (column[f] - residual[f]) / step : 0;
+    }
+    return GROOM_OK;
+}
+
+static double dot(const double *a, const double *b)
+{
+    double sum = 0;
+    for (int f = 0; f < MOMENTS_COUNT; f++)
+        sum += a[f] * b[f];
+    return sum;
+}
+
+/* (J^T J + damping) step = -J^T r */
+static int solve_step(const double *jacobian, const double residual[MOMENTS_COUNT], uint32_t n, double damping,
+                      double step[MOST_PARAMETERS])
+{
+    double a[MOST_PARAMETERS * MOST_PARAMETERS];
+    for (uint32_t i = 0; i < n; i++) {
+        const double *row = jacobian + (size_t)i * MOMENTS_COUNT;
+        for (uint32_t j = 0; j <= i; j++)
+            a[i * n + j] = dot(row, jacobian + (size_t)j * MOMENTS_COUNT);
+        a[i * n + i] += damping * a[i * n + i] + DAMPING_FLOOR;
+        step[i] = -dot(row, residual);
+    }
+    if (!dense_cholesky(a, n))
+        return 0;
+    dense_forward(a, n, step);
+    dense_backward(a, n, step);
+    return 1;
+}
+
+static void take_step(const struct trial *from, const double step[MOST_PARAMETERS], struct trial *to)
+{
+    for (uint32_t k = 0; k < from->n_unknowns; k++) {
+        double most = from->unknowns[k].logarithmic ? LONGEST_STEP : LONGEST_START;
+        write_unknown(&to->unknowns[k], read_unknown(&from->unknowns[k]) + fmin(fmax(step[k], -most), most));
+    }
+}
+
+/* One step of Levenberg and Marquardt: the least damping that gets lower. *ended where none does. */
+static groom_status refine(struct groom_fit *fit, struct matching *matching, double *square, int *ended,
+                           const struct groom_context *context, struct groom_diag *diag)
+{
+    static const double dampings[] = {1e-3, 1e-1, 3, 100};
+    const struct groom_allocator *allocator = memory_allocator(context);
+    struct trial here, there;
+    double residual[MOMENTS_COUNT], step[MOST_PARAMETERS], before;
+    double *jacobian = memory_array(allocator, MOST_PARAMETERS, MOMENTS_COUNT * sizeof *jacobian);
+    groom_status st = GROOM_OK;
+    if (!jacobian)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to refine operators");
+    trial_init(fit, &here);
+    trial_init(fit, &there);
+    *ended = 1;
+    if ((st = matching_residual(matching, here.operators, residual, context, diag)) != GROOM_OK ||
+        (st = differentiate(matching, &here, residual, jacobian, context, diag)) != GROOM_OK)
+        goto out;
+    before = *square = square_of(residual);
+    for (int d = 0; d < 4; d++) {
+        double other;
+        if (!solve_step(jacobian, residual, here.n_unknowns, dampings[d], step))
+            continue;
+        take_step(&here, step, &there);
+        if ((st = misfit(matching, &there, &other, context, diag)) != GROOM_OK)
+            goto out;
+        if (other < before) {
+            *square = other;
+            *ended = before - other < CONVERGED * before;
+            trial_keep(&there, fit);
+            break;
+        }
+    }
+out:
+    memory_release(allocator, jacobian, MOST_PARAMETERS, MOMENTS_COUNT * sizeof *jacobian);
+    return st;
+}
+
+/* --- the paper's losses ---------------------------------------------------------------------------- */
+
+struct losses { double spectra, segments, shape, scale, clump; };
+
+/* The groom's strands and the target's, in metres; both resampled alike. */
+static groom_status gather(const struct groom_fit *fit, const uint32_t *strand, uint32_t n, float (*fitted)[3],
+                           float (*target)[3], const struct groom_context *context, struct groom_diag *diag)
+{
+    struct groom *groom = NULL;
+    struct groom_strands *evaluated = NULL;
+    groom_status st;
+    if ((st = groom_select(fit->groom, strand, n, context, &groom, diag)) != GROOM_OK ||
+        (st = groom_strands_create(n, (uint64_t)n * fit->m, context, &evaluated, diag)) != GROOM_OK)
+        goto out;
+    for (uint32_t i = 0; i <= n; i++)
+        evaluated->first[i] = i * fit->m;
+    if ((st = groom_evaluate(groom, 0, n, evaluated->points, context, diag)) != GROOM_OK ||
+        (st = groom_strands_resample(evaluated, fit->m, fitted, context, diag)) != GROOM_OK)
+        goto out;
+    for (uint32_t i = 0; i < n; i++)
+        for (uint32_t j = 0; j < fit->m; j++)
+            for (int c = 0; c < 3; c++)
+                target[(size_t)i * fit->m + j][c] =
+                    fit->target[(size_t)strand[i] * fit->m + j][c] * fit->scale + fit->centre[c];
+out:
+    groom_strands_destroy(evaluated);
+    groom_destroy(groom);
+    return st;
+}
+
+struct yardstick {
+    uint32_t n_shape, n_batches, n_batch, n;  /* n: strands in all */
+    uint32_t *strand;                         /* [n] n_shape, then the batches */
+    float (*fitted)[3], (*target)[3];         /* [n * m] */
+};
+
+static groom_status choose_strands(const struct groom_fit *fit, struct yardstick *y, const struct groom_context *context,
+                                   struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    struct groom_random_key key = {fit->options.seed, STREAM_BATCHES};
+    uint32_t *order = memory_array(allocator, fit->n, sizeof *order);
+    if (!order)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to draw strands");
+    groom_fair_order(fit->n, order);
+    memcpy(y->strand, order, y->n_shape * sizeof *order);
+    memory_release(allocator, order, fit->n, sizeof *order);
+    return determinant_batches((const float (*)[2])fit->root_uv, fit->n, y->n_batches, y->n_batch, key, context,
+                               y->strand + y->n_shape, diag);
+}
+
+static groom_status compare(const struct groom_fit *fit, const struct yardstick *y, struct losses *losses,
+                            const struct groom_context *context, struct groom_diag *diag)
+{
+    const float (*a)[3] = (const float (*)[3])y->fitted, (*b)[3] = (const float (*)[3])y->target;
+    size_t first = (size_t)y->n_shape * fit->m;
+    struct groom_random_key key = {fit->options.seed, STREAM_SLICES};
+    struct loss_shape shape;
+    double unit = UNIT * fit->ordinary;
+    groom_status st = loss_shape(a, b, y->n_shape, fit->m, unit, fit->options.stages.operators.lambda_e, key, context,
+                                 &shape, diag);
+    if (st != GROOM_OK)
+        return st;
+    losses->spectra = shape.spectra;
+    losses->segments = shape.segments;
+    losses->shape = shape.total;
+    if ((st = loss_determinant(a + first, b + first, y->n_batches, y->n_batch, fit->m, unit,
+                               fit->options.stages.operators.sigma_scale, determinant_scale_kernel, context,
+                               &losses->scale, diag)) != GROOM_OK)
+        return st;
+    return loss_determinant(a + first, b + first, y->n_batches, y->n_batch, fit->m, unit,
+                            fit->options.stages.operators.sigma_clump, determinant_clump_kernel, context,
+                            &losses->clump, diag);
+}
+
+static uint32_t batch_size(const struct groom_fit *fit)
+{
+    double n = fit->n * fit->options.stages.operators.batch_fraction;
+    n = fmin(fmax(n, 2), fit->options.stages.operators.batch_maximum);
+    return n < fit->n ? (uint32_t)n : fit->n;
+}
+
+static groom_status measure_losses(const struct groom_fit *fit, struct losses *losses,
+                                   const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    struct yardstick y = {.n_shape = fit->n < LOSS_STRANDS ? fit->n : LOSS_STRANDS,
+                          .n_batches = fit->options.stages.operators.batches_late, .n_batch = batch_size(fit)};
+    y.n = y.n_shape + y.n_batches * y.n_batch;
+    size_t n_points = (size_t)y.n * fit->m;
+    groom_status st = GROOM_ENOMEM;
+    y.strand = memory_array(allocator, y.n, sizeof *y.strand);
+    y.fitted = memory_array(allocator, n_points, sizeof *y.fitted);
+    y.target = memory_array(allocator, n_points, sizeof *y.target);
+    if (!y.strand || !y.fitted || !y.target)
+        groom_fail(diag, st, "no memory to measure the losses of %u strands", y.n);
+    else if ((st = choose_strands(fit, &y, context, diag)) == GROOM_OK &&
+             (st = gather(fit, y.strand, y.n, y.fitted, y.target, context, diag)) == GROOM_OK)
+        st = compare(fit, &y, losses, context, diag);
+    memory_release(allocator, y.strand, y.n, sizeof *y.strand);
+    memory_release(allocator, y.fitted, n_points, sizeof *y.fitted);
+    memory_release(allocator, y.target, n_points, sizeof *y.target);
+    return st;
+}
+
+/* The value before the stage goes into both columns of the report; that after it into the second. */
+static void note_loss(struct groom_fit *fit, const char *name, double value, uint64_t iteration,
+                      const struct groom_context *context)
+{
+    struct groom_fit_report *report = &fit->report;
+    progress_loss(context, name, iteration, value);
+    for (uint32_t i = 0; i < report->n_losses; i++)
+        if (strcmp(report->losses[i].stage, "operators") == 0 && strcmp(report->losses[i].name, name) == 0) {
+            report->losses[i].after = value;
+            return;
+        }
+    report_loss(report, "operators", name, value, value);
+}
+
+static groom_status report_losses(struct groom_fit *fit, uint64_t iteration, const struct groom_context *context,
+                                  struct groom_diag *diag)
+{
+    struct losses losses;
+    groom_status st = measure_losses(fit, &losses, context, diag);
+    if (st != GROOM_OK)
+        return st;
+    note_loss(fit, "shape", losses.shape, iteration, context);
+    note_loss(fit, "spectra", losses.spectra, iteration, context);
+    note_loss(fit, "segments", losses.segments, iteration, context);
+    note_loss(fit, "scale", losses.scale, iteration, context);
+    note_loss(fit, "clump", losses.clump, iteration, context);
+    return GROOM_OK;
+}
+
+/* --- the stage ------------------------------------------------------------------------------------ */
+
+/* The next unknown, from this one on, that is searched: a frequency. */
+static uint32_t next_searched(const struct trial *trial, uint32_t from)
+{
+    while (from < trial->n_unknowns && !trial->unknowns[from].frequency)
+        from++;
+    return from;
+}
+
+static double floor_of(const struct groom_fit *fit)
+{
+    return fit->phase == SEARCH ? FLOOR_FIRST : fmax(FLOOR_FIRST * pow(FLOOR_RATIO, fit->iteration), FLOOR_LAST);
+}
+
+static void begin(struct groom_fit *fit)
+{
+    struct trial trial;
+    trial_init(fit, &trial);
+    for (uint32_t k = 0; k < trial.n_unknowns; k++) {
+        const struct unknown *unknown = &trial.unknowns[k];
+        double least = (unknown->random ? LEAST_RANDOM : LEAST_START) * unknown->initial;
+        if (unknown->logarithmic && *unknown->value < least)
+            write_unknown(unknown, log(least));
+    }
+    trial_keep(&trial, fit);
+    fit->iteration = next_searched(&trial, 0);
+    fit->phase = fit->iteration < trial.n_unknowns ? SEARCH : REFINE;
+    fit->iteration = fit->phase == SEARCH ? fit->iteration : 0;
+}
+
+static groom_status search_step(struct groom_fit *fit, struct matching *matching, const struct groom_context *context,
+                                struct groom_diag *diag)
+{
+    struct trial trial;
+    double square;
+    groom_status st;
+    trial_init(fit, &trial);
+    if ((st = misfit(matching, &trial, &square, context, diag)) != GROOM_OK ||
+        (st = search_one(matching, &trial, fit->iteration, &square, context, diag)) != GROOM_OK)
+        return st;
+    trial_keep(&trial, fit);
+    note_loss(fit, "misfit", square, fit->iteration, context);
+    if ((fit->iteration = next_searched(&trial, fit->iteration + 1)) == trial.n_unknowns) {
+        fit->phase = REFINE;
+        fit->iteration = 0;
+    }
+    return GROOM_OK;
+}
+
+static groom_status refine_step(struct groom_fit *fit, struct matching *matching, const struct groom_context *context,
+                                struct groom_diag *diag)
+{
+    double square;
+    int converged;
+    groom_status st = refine(fit, matching, &square, &converged, context, diag);
+    if (st != GROOM_OK)
+        return st;
+    note_loss(fit, "misfit", square, count_unknowns(fit) + fit->iteration, context);
+    if (++fit->iteration >= fit->options.stages.operators.refinements || (converged && floor_of(fit) <= FLOOR_LAST)) {
+        fit->phase = AFTER;
+        fit->iteration = 0;
+    }
+    return GROOM_OK;
+}
+
+static groom_status match_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    struct matching *matching;
+    groom_status st = matching_create(fit, fit->options.stages.operators.pairs, floor_of(fit), context, &matching, diag);
+    if (st != GROOM_OK)
+        return st;
+    st = fit->phase == SEARCH ? search_step(fit, matching, context, diag) : refine_step(fit, matching, context, diag);
+    matching_destroy(matching);
+    return st;
+}
+
+groom_status operators_step(struct groom_fit *fit, int *ended, const struct groom_context *context,
+                            struct groom_diag *diag)
+{
+    groom_status st = GROOM_OK;
+    switch ((enum phase)fit->phase) {
+    case BEFORE:
+        if (count_unknowns(fit) == 0 || fit->options.stages.operators.refinements == 0)
+            fit->phase = ENDED;
+        else if ((st = report_losses(fit, 0, context, diag)) == GROOM_OK)
+            begin(fit);
+        break;
+    case SEARCH:
+    case REFINE: st = match_step(fit, context, diag); break;
+    case AFTER:
+        if ((st = report_losses(fit, 1, context, diag)) == GROOM_OK)
+            fit->phase = ENDED;
+        break;
+    case ENDED: break;
+    }
+    *ended = st == GROOM_OK && fit->phase == ENDED;
+    return st;
+}
+
+double operators_fraction(const struct groom_fit *fit)
+{
+    uint32_t n = fit->groom ? count_unknowns(fit) : 0;
+    double search = n ? (double)fit->iteration / n : 0;
+    double refined = (double)fit->iteration / fmax(fit->options.stages.operators.refinements, 1);
+    switch ((enum phase)fit->phase) {
+    case BEFORE: return 0;
+    case SEARCH: return 0.05 + 0.3 * search;
+    case REFINE: return 0.35 + 0.6 * fmin(refined, 1);
+    case AFTER: return 0.95;
+    case ENDED: break;
+    }
+    return 1;
+}
+
+int operators_sound(const struct groom_fit *fit)
+{
+    if (fit->groom->n_operators > GROOM_FIT_MAX_OPERATORS)
+        return 0;
+    switch ((enum phase)fit->phase) {
+    case BEFORE:
+    case AFTER: return 1;
+    case SEARCH: return fit->iteration < count_unknowns(fit);
+    case REFINE: return fit->iteration < fit->options.stages.operators.refinements;
+    case ENDED: break;
+    }
+    return 0;
+}
