@@ -35,6 +35,8 @@ enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 #define LONGEST_STEP 0.7       /* of a parameter in one step of refinement */
 #define LONGEST_START 0.2      /* the same of where a bend or curl sets in */
 #define DAMPING_FLOOR 0.1      /* keeps parameters that nothing speaks for where they are */
+#define LEAST_TURNS 1.0        /* of a curl over a guide: less is a shift that all strands of an operator guide
+                                * share, which shows as patches, most of all in short hair */
 #define CONVERGED 1e-3         /* share of the misfit that a step must gain */
 #define MOST_PARAMETERS (GROOM_FIT_MAX_OPERATORS * GROOM_OPERATOR_MAX_PARAMETERS)
 
@@ -56,17 +58,42 @@ static double initial_of(const struct groom_operator_parameter *parameter, doubl
     return strcmp(parameter->unit, "1/m") == 0 ? parameter->initial / ordinary : parameter->initial;
 }
 
+static double mean_guide_length(const struct groom *groom)
+{
+    double sum = 0;
+    for (uint32_t g = 0; g < groom->n_guides; g++)
+        sum += groom_polyline_length((const float (*)[3])groom->guides + (size_t)g * groom->n_vertices, groom->n_vertices);
+    return sum / groom->n_guides;
+}
+
+static double minimum_of(const struct groom_operator_parameter *parameter, double initial, groom_operator_type type,
+                         double guide_length)
+{
+    double least = fmax(parameter->minimum, LEAST_LOGARITHM * initial);
+    if (type == GROOM_OPERATOR_CURL && strcmp(parameter->name, "frequency") == 0 && guide_length > 0)
+        least = fmin(fmax(least, LEAST_TURNS / guide_length), parameter->maximum);
+    return least;
+}
+
+/* Stage initialize looked for a curl or a clump and found none: the statistics could still be met a little
+ * better with one, at the price of patches, for these two move the strands of an operator guide together. */
+static int is_absent(const struct groom_operator *op)
+{
+    return (op->type == GROOM_OPERATOR_CURL || op->type == GROOM_OPERATOR_CLUMP) && op->parameter[0] == 0;
+}
+
 static uint32_t list_unknowns(struct groom_operator *operators, uint32_t n_operators, double ordinary,
-                              struct unknown *unknowns)
+                              double guide_length, struct unknown *unknowns)
 {
     uint32_t n = 0, n_parameters;
     for (uint32_t o = 0; o < n_operators; o++) {
         const struct groom_operator_parameter *p = groom_operator_parameters(operators[o].type, &n_parameters);
-        for (uint32_t k = 0; operators[o].enabled && k < n_parameters; k++) {
+        for (uint32_t k = 0; operators[o].enabled && !is_absent(&operators[o]) && k < n_parameters; k++) {
             int place = p[k].slider_maximum <= 1 && strcmp(p[k].name, "start") == 0;
             double initial = initial_of(&p[k], ordinary);
             unknowns[n++] = (struct unknown){&operators[o].parameter[k],
-                                             place ? p[k].minimum : fmax(p[k].minimum, LEAST_LOGARITHM * initial),
+                                             place ? p[k].minimum
+                                                   : minimum_of(&p[k], initial, operators[o].type, guide_length),
                                              p[k].maximum, initial, !place,
                                              strcmp(p[k].name, "frequency") == 0,
                                              strncmp(p[k].name, "random", 6) == 0};
@@ -97,7 +124,8 @@ static void trial_init(const struct groom_fit *fit, struct trial *trial)
 {
     trial->n_operators = fit->groom->n_operators;
     memcpy(trial->operators, fit->groom->operators, trial->n_operators * sizeof *trial->operators);
-    trial->n_unknowns = list_unknowns(trial->operators, trial->n_operators, fit->ordinary, trial->unknowns);
+    trial->n_unknowns = list_unknowns(trial->operators, trial->n_operators, fit->ordinary,
+                                      mean_guide_length(fit->groom), trial->unknowns);
 }
 
 static void trial_keep(const struct trial *trial, struct groom_fit *fit)
@@ -413,7 +441,7 @@ static void begin(struct groom_fit *fit)
     trial_init(fit, &trial);
     for (uint32_t k = 0; k < trial.n_unknowns; k++) {
         const struct unknown *unknown = &trial.unknowns[k];
-        double least = (unknown->random ? LEAST_RANDOM : LEAST_START) * unknown->initial;
+        double least = fmax((unknown->random ? LEAST_RANDOM : LEAST_START) * unknown->initial, unknown->minimum);
         if (unknown->logarithmic && *unknown->value < least)
             write_unknown(unknown, log(least));
     }
