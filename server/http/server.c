@@ -745,8 +745,8 @@ bool server_stop(struct server *server, uint32_t timeout_ms)
 {
     int64_t until = now_us() + (int64_t)timeout_ms * 1000;
     MHD_socket listening = MHD_quiesce_daemon(server->mhd);
-    if (listening != MHD_INVALID_SOCKET)
-        close(listening);
+    if (listening != MHD_INVALID_SOCKET) /* nobody gets in; closed when no thread can name it any more */
+        shutdown(listening, SHUT_RDWR);
     atomic_store(&server->draining, true);
     followers_wake(server->followers);
     wait_until_zero(&server->n_requests, until - (int64_t)timeout_ms * 250);
@@ -756,6 +756,8 @@ bool server_stop(struct server *server, uint32_t timeout_ms)
         return false;
     MHD_stop_daemon(server->mhd);
     server->mhd = NULL;
+    if (listening != MHD_INVALID_SOCKET)
+        close(listening);
     return true;
 }
 
