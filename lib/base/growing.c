@@ -62,8 +62,10 @@ groom_status growing_read_all(struct growing *bytes, const struct groom_source *
         int64_t n = source->read(source->user, room, PIECE_BYTES);
         if (n < 0)
             return groom_fail_at(diag, GROOM_EIO, (int64_t)bytes->count, "reading failed after %zu bytes", bytes->count);
-        if (n == 0)
+        if (n == 0) {
+            memset(room, 0, GROWING_PADDING);
             return GROOM_OK;
+        }
         bytes->count += (size_t)n;
         if (bytes->count > max_bytes)
             return groom_fail(diag, GROOM_ETOOBIG, "the file has more than %zu bytes, the limit", max_bytes);

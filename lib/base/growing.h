@@ -20,7 +20,9 @@ void growing_finish(struct growing *array, const struct groom_allocator *allocat
 /* Room for n more items at the end, counted in and uninitialised; NULL where memory is out. */
 void *growing_add(struct growing *array, size_t n, const struct groom_allocator *allocator);
 
-/* All the bytes of a source, up to max_bytes, into an array of bytes.
+#define GROWING_PADDING 16
+/* All the bytes of a source, up to max_bytes, into an array of bytes. GROWING_PADDING zero bytes
+ * follow them that are not counted, so that what scans text needs not look for the end.
  * returns  GROOM_OK, GROOM_ETOOBIG, GROOM_EIO, GROOM_ENOMEM */
 GROOM_MUST_CHECK groom_status growing_read_all(struct growing *bytes, const struct groom_source *source,
                                                size_t max_bytes, const struct groom_allocator *allocator,

@@ -4,6 +4,7 @@
 #define GEOMETRY_MESH_BUILD_H
 
 #include "base/growing.h"
+#include "base/number.h"
 #include "groom/mesh.h"
 
 #define MESH_NO_UV UINT32_MAX
@@ -29,7 +30,17 @@ struct mesh_build {
 void mesh_build_init(struct mesh_build *build, const struct groom_context *context);
 void mesh_build_finish(struct mesh_build *build);
 
-/* Readers: bytes[0 .. n_bytes - 1] into build. */
+/* base/number.h for text as char; NULL where no number stands. */
+static inline const char *mesh_scan_number(const char *at, double *value)
+{
+    return (const char *)number_scan_any((const unsigned char *)at, value);
+}
+static inline const char *mesh_scan_integer(const char *at, long long *value)
+{
+    return (const char *)number_scan_integer((const unsigned char *)at, value);
+}
+
+/* Readers: bytes[0 .. n_bytes - 1] into build, with GROWING_PADDING zero bytes behind them. */
 GROOM_MUST_CHECK groom_status mesh_read_obj(struct mesh_build *build, const char *bytes, size_t n_bytes,
                                             const char *group, struct groom_diag *diag);
 GROOM_MUST_CHECK groom_status mesh_read_ply(struct mesh_build *build, const char *bytes, size_t n_bytes,

@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "base/number.h"
 #include "geometry/mesh_build.h"
 
 struct obj_reader {
@@ -46,7 +45,7 @@ static groom_status read_numbers(struct obj_reader *r, struct growing *array, in
     for (int i = 0; i < n; i++) {
         double value = 0;
         skip_space(r);
-        const char *after = number_parse(r->at, r->stop, &value);
+        const char *after = mesh_scan_number(r->at, &value);
         if (!after && (i < needed || r->at < r->stop))
             return refuse(r, array == &r->build->points ? "a coordinate of a vertex" : "a texture coordinate");
         r->at = after ? after : r->at;
@@ -56,9 +55,9 @@ static groom_status read_numbers(struct obj_reader *r, struct growing *array, in
 }
 
 /* 1 is the first, -1 the last so far; 0 is nobody. */
-static int resolve(int64_t index, size_t count, uint32_t *out)
+static int resolve(long long index, size_t count, uint32_t *out)
 {
-    int64_t i = index > 0 ? index - 1 : (int64_t)count + index;
+    long long i = index > 0 ? index - 1 : (long long)count + index;
     if (index == 0 || i < 0 || i >= UINT32_MAX)
         return 0;
     *out = (uint32_t)i;
@@ -68,8 +67,8 @@ static int resolve(int64_t index, size_t count, uint32_t *out)
 /* v, v/vt, v//vn, v/vt/vn */
 static groom_status read_corner(struct obj_reader *r, struct mesh_corner *corner)
 {
-    int64_t index;
-    const char *after = number_parse_int(r->at, r->stop, &index);
+    long long index;
+    const char *after = mesh_scan_integer(r->at, &index);
     if (!after || !resolve(index, r->build->points.count, &corner->vertex))
         return refuse(r, "the number of a vertex, from 1, or from -1 backwards");
     r->at = after;
@@ -77,7 +76,7 @@ static groom_status read_corner(struct obj_reader *r, struct mesh_corner *corner
     if (r->at == r->stop || *r->at != '/')
         return GROOM_OK;
     r->at++;
-    if ((after = number_parse_int(r->at, r->stop, &index)) != NULL) {
+    if ((after = mesh_scan_integer(r->at, &index)) != NULL) {
         if (!resolve(index, r->build->uvs.count, &corner->uv))
             return refuse(r, "the number of a texture coordinate, from 1, or from -1 backwards");
         r->at = after;

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "base/number.h"
 #include "geometry/mesh_build.h"
 
 #define MOST_ELEMENTS 16
@@ -127,9 +126,9 @@ static groom_status header_format(struct ply_reader *r, const struct ply_line *l
 
 static groom_status header_element(struct ply_reader *r, const struct ply_line *line)
 {
-    int64_t count;
+    long long count;
     const char *word = line->words[2], *stop = word + strlen(word);
-    if (number_parse_int(word, stop, &count) != stop || count < 0 || *word == '\0')
+    if (mesh_scan_integer(word, &count) != stop || count < 0)
         return refuse_line(r, "a count");
     if (r->n_elements == MOST_ELEMENTS)
         return refuse_line(r, "no more than 16 elements");
@@ -266,7 +265,7 @@ static groom_status read_value(struct ply_reader *r, enum ply_type type, double 
     }
     while (r->at < r->end && (*r->at == ' ' || *r->at == '\t' || *r->at == '\r' || *r->at == '\n'))
         r->at++;
-    const char *after = number_parse(r->at, r->end, value);
+    const char *after = mesh_scan_number(r->at, value);
     if (!after)
         return refuse(r, "a number");
     r->at = after;

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "strands/number.h"
+#include "base/number.h"
 #include "strands/reader.h"
 #include "strands/text.h"
 

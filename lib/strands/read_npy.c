@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "strands/number.h"
+#include "base/number.h"
 
 #define MAX_HEADER 4096
 

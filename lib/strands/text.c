@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "strands/number.h"
+#include "base/number.h"
 
 void text_begin(struct text *text, struct input *in)
 {
@@ -74,8 +74,7 @@ static int accept(struct text *text, const unsigned char *after)
 int text_number(struct text *text, double *value)
 {
     text_ready(text);
-    const unsigned char *after = number_scan_padded(text->p, value);
-    return accept(text, after ? after : number_scan_special(text->p, value));
+    return accept(text, number_scan_any(text->p, value));
 }
 
 int text_integer(struct text *text, long long *value)

@@ -2,7 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "strands/number.h"
+#include "base/number.h"
 #include "strands/writer.h"
 
 /* before, the three coordinates, after */

@@ -6,7 +6,7 @@
 
 #include "base/memory.h"
 #include "base/progress.h"
-#include "strands/number.h"
+#include "base/number.h"
 
 #define DEFAULT_WIDTH_M 0.00008
 

@@ -1,6 +1,7 @@
 /* Values of the command line that several commands take. */
 #include <errno.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "proto/work.h"
 #include "server/worker/worker.h"
@@ -11,6 +12,8 @@ unsigned worker_threads(void)
     unsigned long n = text ? strtoul(text, NULL, 10) : 0;
     return n <= 1024 ? (unsigned)n : 1024;
 }
+
+const char *worker_format_name(const char *text) { return *text && strcmp(text, "auto") ? text : NULL; }
 
 groom_status worker_frame_parse(const char *unit, const char *up, struct groom_frame *frame,
                                 struct groom_diag *diag)

@@ -9,7 +9,7 @@
 /* 200 000 strands with everything that a groom may hold are some 80 MB of JSON. */
 #define MAX_DOCUMENT ((size_t)1 << 30)
 
-static groom_status check(struct worker_input *input, const struct groom_context *context,
+static groom_status check(void *unused, struct worker_input *input, const struct groom_context *context,
                           struct groom_diag *diag)
 {
     static const int output = STDOUT_FILENO;
@@ -33,19 +33,8 @@ static groom_status check(struct worker_input *input, const struct groom_context
 
 int worker_check_groom(int argc, char **argv)
 {
-    struct groom_context context = {0};
-    struct worker_input input;
-    struct groom_diag diag = {0};
-    if (argc != 1) {
-        fprintf(stderr, "groom-worker check-groom: takes no argument (\"%s\")\n", argv[1]);
-        return WORKER_USAGE;
-    }
-    worker_enter_sandbox();
-    worker_input_open(STDIN_FILENO, &input);
-    groom_status st = groom_pool_create(worker_threads(), &context.pool);
-    if (st == GROOM_OK)
-        st = check(&input, &context, &diag);
-    groom_pool_destroy(context.pool);
-    worker_input_close(&input);
-    return st == GROOM_OK ? WORKER_OK : worker_print_problem(st, &diag);
+    if (argc == 1)
+        return worker_run_sandboxed(check, NULL);
+    fprintf(stderr, "groom-worker check-groom: takes no argument (\"%s\")\n", argv[1]);
+    return WORKER_USAGE;
 }

@@ -26,7 +26,7 @@ static int parse(int argc, char **argv, struct request *request)
     while ((c = getopt_long(argc, argv, "", options, NULL)) != -1) {
         switch (c) {
         case 'f':
-            request->from_format = *optarg && strcmp(optarg, "auto") ? optarg : NULL;
+            request->from_format = worker_format_name(optarg);
             break;
         case 'u':
             request->from_unit = optarg;
@@ -132,12 +132,15 @@ static groom_status resample(struct groom_strands **strands, uint32_t n_vertices
     return st;
 }
 
-static groom_status convert(struct request *request, struct worker_input *input,
-                            const struct groom_context *context, struct groom_diag *diag)
+static groom_status convert(void *user, struct worker_input *input, const struct groom_context *context,
+                            struct groom_diag *diag)
 {
     static const int output = STDOUT_FILENO;
+    struct request *request = user;
     struct groom_strands *strands = NULL;
-    groom_status st = groom_strands_read(&input->source, &request->read, context, &strands, NULL, diag);
+    groom_status st = interpret(request, diag);
+    if (st == GROOM_OK)
+        st = groom_strands_read(&input->source, &request->read, context, &strands, NULL, diag);
     if (st == GROOM_OK && request->n_count && request->n_count < strands->n_strands)
         st = thin(&strands, (uint32_t)request->n_count, context, diag);
     if (st == GROOM_OK && request->n_vertices)
@@ -151,19 +154,5 @@ static groom_status convert(struct request *request, struct worker_input *input,
 int worker_convert(int argc, char **argv)
 {
     struct request request = {0};
-    struct groom_context context = {0};
-    struct worker_input input;
-    struct groom_diag diag = {0};
-    if (!parse(argc, argv, &request))
-        return WORKER_USAGE;
-    worker_enter_sandbox();
-    worker_input_open(STDIN_FILENO, &input);
-    groom_status st = groom_pool_create(worker_threads(), &context.pool);
-    if (st == GROOM_OK)
-        st = interpret(&request, &diag);
-    if (st == GROOM_OK)
-        st = convert(&request, &input, &context, &diag);
-    groom_pool_destroy(context.pool);
-    worker_input_close(&input);
-    return st == GROOM_OK ? WORKER_OK : worker_print_problem(st, &diag);
+    return parse(argc, argv, &request) ? worker_run_sandboxed(convert, &request) : WORKER_USAGE;
 }

@@ -32,6 +32,23 @@ void worker_input_close(struct worker_input *input)
     memset(input, 0, sizeof *input);
 }
 
+int worker_run_sandboxed(groom_status (*body)(void *, struct worker_input *, const struct groom_context *,
+                                              struct groom_diag *),
+                         void *request)
+{
+    struct groom_context context = {0};
+    struct worker_input input;
+    struct groom_diag diag = {0};
+    worker_enter_sandbox();
+    worker_input_open(STDIN_FILENO, &input);
+    groom_status st = groom_pool_create(worker_threads(), &context.pool);
+    if (st == GROOM_OK)
+        st = body(request, &input, &context, &diag);
+    groom_pool_destroy(context.pool);
+    worker_input_close(&input);
+    return st == GROOM_OK ? WORKER_OK : worker_print_problem(st, &diag);
+}
+
 groom_status worker_input_text(struct worker_input *input, size_t limit, char **text, size_t *n_bytes,
                                struct groom_diag *diag)
 {

@@ -149,7 +149,7 @@ static int parse(int argc, char **argv, struct request *request)
             request->kind = optarg;
             break;
         case 'f':
-            request->format = *optarg && strcmp(optarg, "auto") ? optarg : NULL;
+            request->format = worker_format_name(optarg);
             break;
         case 'u':
             request->unit = optarg;
@@ -171,9 +171,10 @@ static int parse(int argc, char **argv, struct request *request)
     return 0;
 }
 
-static groom_status inspect(struct request *request, struct worker_input *input,
-                            const struct groom_context *context, struct groom_diag *diag)
+static groom_status inspect(void *user, struct worker_input *input, const struct groom_context *context,
+                            struct groom_diag *diag)
 {
+    struct request *request = user;
     groom_status st = worker_frame_parse(request->unit, request->up, &request->frame, diag);
     if (st == GROOM_OK)
         st = worker_count_parse("--max-vertices", request->max_vertices, UINT32_MAX, &request->n_max, diag);
@@ -185,17 +186,5 @@ static groom_status inspect(struct request *request, struct worker_input *input,
 int worker_inspect(int argc, char **argv)
 {
     struct request request = {0};
-    struct groom_context context = {0};
-    struct worker_input input;
-    struct groom_diag diag = {0};
-    if (!parse(argc, argv, &request))
-        return WORKER_USAGE;
-    worker_enter_sandbox();
-    worker_input_open(STDIN_FILENO, &input);
-    groom_status st = groom_pool_create(worker_threads(), &context.pool);
-    if (st == GROOM_OK)
-        st = inspect(&request, &input, &context, &diag);
-    groom_pool_destroy(context.pool);
-    worker_input_close(&input);
-    return st == GROOM_OK ? WORKER_OK : worker_print_problem(st, &diag);
+    return parse(argc, argv, &request) ? worker_run_sandboxed(inspect, &request) : WORKER_USAGE;
 }

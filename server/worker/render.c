@@ -16,6 +16,7 @@ struct request {
     const char *unit, *up, *head, *head_unit, *head_up, *view, *size;
     struct groom_frame frame, head_frame;
     struct groom_render_options options;
+    struct worker_input head_input;
 };
 
 static int parse(int argc, char **argv, struct request *request)
@@ -52,13 +53,15 @@ static groom_status interpret(struct request *request, struct groom_diag *diag)
     return st;
 }
 
-static groom_status open_head(const struct request *request, struct worker_input *head, int *fd,
-                              struct groom_diag *diag)
+/* The mapping holds the file; a head that is not a regular file is refused. */
+static groom_status open_head(struct request *request, struct groom_diag *diag)
 {
     if (!request->head) return GROOM_OK;
-    *fd = open(request->head, O_RDONLY | O_CLOEXEC);
-    if (*fd < 0) return groom_fail(diag, GROOM_EIO, "the head cannot be opened: %s", strerror(errno));
-    worker_input_open(*fd, head);
+    int fd = open(request->head, O_RDONLY | O_CLOEXEC);
+    if (fd < 0) return groom_fail(diag, GROOM_EIO, "the head cannot be opened: %s", strerror(errno));
+    worker_input_open(fd, &request->head_input);
+    close(fd);
+    if (!request->head_input.map) return groom_fail(diag, GROOM_EIO, "the head is empty or no regular file");
     return GROOM_OK;
 }
 
@@ -76,15 +79,18 @@ static groom_status draw(const struct groom_strands *strands, const struct groom
     return st;
 }
 
-static groom_status render(const struct request *request, struct worker_input *input, struct worker_input *head,
-                           const struct groom_context *context, struct groom_diag *diag)
+static groom_status render(void *user, struct worker_input *input, const struct groom_context *context,
+                           struct groom_diag *diag)
 {
-    struct groom_read_options read = {.frame = request->frame};
-    struct groom_mesh_read_options read_head = {.frame = request->head_frame};
+    struct request *request = user;
     struct groom_strands *strands = NULL;
     struct groom_mesh *mesh = NULL;
-    groom_status st = groom_strands_read(&input->source, &read, context, &strands, NULL, diag);
-    if (st == GROOM_OK && request->head) st = groom_mesh_read(&head->source, &read_head, context, &mesh, NULL, diag);
+    groom_status st = interpret(request, diag);
+    struct groom_read_options read = {.frame = request->frame};
+    struct groom_mesh_read_options read_head = {.frame = request->head_frame};
+    if (st == GROOM_OK) st = groom_strands_read(&input->source, &read, context, &strands, NULL, diag);
+    if (st == GROOM_OK && request->head)
+        st = groom_mesh_read(&request->head_input.source, &read_head, context, &mesh, NULL, diag);
     if (st == GROOM_OK) st = draw(strands, mesh, &request->options, context, diag);
     groom_strands_destroy(strands);
     groom_mesh_destroy(mesh);
@@ -94,20 +100,10 @@ static groom_status render(const struct request *request, struct worker_input *i
 int worker_render(int argc, char **argv)
 {
     struct request request = {0};
-    struct groom_context context = {0};
-    struct worker_input input = {0}, head = {0};
     struct groom_diag diag = {0};
-    int head_fd = -1;
     if (!parse(argc, argv, &request)) return WORKER_USAGE;
-    groom_status st = open_head(&request, &head, &head_fd, &diag); /* before the sandbox closes the way */
-    worker_enter_sandbox();
-    worker_input_open(STDIN_FILENO, &input);
-    if (st == GROOM_OK) st = interpret(&request, &diag);
-    if (st == GROOM_OK) st = groom_pool_create(worker_threads(), &context.pool);
-    if (st == GROOM_OK) st = render(&request, &input, &head, &context, &diag);
-    groom_pool_destroy(context.pool);
-    worker_input_close(&input);
-    worker_input_close(&head);
-    if (head_fd >= 0) close(head_fd);
-    return st == GROOM_OK ? WORKER_OK : worker_print_problem(st, &diag);
+    groom_status st = open_head(&request, &diag); /* before the sandbox closes the way */
+    int exit_status = st == GROOM_OK ? worker_run_sandboxed(render, &request) : worker_print_problem(st, &diag);
+    worker_input_close(&request.head_input);
+    return exit_status;
 }

@@ -34,6 +34,8 @@ unsigned worker_threads(void);
  * on standard error and does not stop the work: rlimits of the launcher still hold. */
 void worker_enter_sandbox(void);
 
+/* What --format says: NULL where the bytes shall tell ("", "auto"). */
+const char *worker_format_name(const char *text);
 /* --unit and --up of a command line, either may be NULL. */
 GROOM_MUST_CHECK groom_status worker_frame_parse(const char *unit, const char *up, struct groom_frame *frame,
                                                  struct groom_diag *diag);
@@ -55,6 +57,12 @@ struct worker_input {
 };
 void worker_input_open(int fd, struct worker_input *input);
 void worker_input_close(struct worker_input *input); /* takes zeroed values */
+
+/* The commands that parse: enter the sandbox, open standard input and a pool of threads, run `body`,
+ * print the problem where it fails. Returns the exit status. */
+int worker_run_sandboxed(groom_status (*body)(void *request, struct worker_input *input,
+                                              const struct groom_context *context, struct groom_diag *diag),
+                         void *request);
 
 /* All of an input as text with a zero behind it (malloc'ed), refused above `limit` bytes. */
 GROOM_MUST_CHECK groom_status worker_input_text(struct worker_input *input, size_t limit, char **text,

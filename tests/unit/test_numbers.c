@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "groom/random.h"
-#include "strands/number.h"
+#include "base/number.h"
 #include "tests/support/test.h"
 
 static float float_of(uint32_t bits)
@@ -174,14 +174,26 @@ START_TEST(scan_refuses_what_is_no_number)
 }
 END_TEST
 
-START_TEST(special_values_are_taken_apart)
-{
+/* text, what it reads as, how much of it is read (0: refused) */
+static const struct special {
+    const char *text;
     double value;
-    ck_assert_ptr_nonnull(number_scan_special((const unsigned char *)"NaN", &value));
-    ck_assert(isnan(value));
-    ck_assert_ptr_nonnull(number_scan_special((const unsigned char *)"-Infinity", &value));
-    ck_assert(value == -INFINITY);
-    ck_assert_ptr_null(number_scan_special((const unsigned char *)"none", &value));
+    size_t length;
+} specials[] = {{"NaN", NAN, 3},      {"nan(0x1) 2", NAN, 8}, {"-Infinity,", -INFINITY, 9}, {"inf", INFINITY, 3},
+                {"1.#IND 2", NAN, 6}, {"-1.#QNAN", NAN, 8},   {"1.5#", 1.5, 3},             {"2.5e-1", 0.25, 6},
+                {"none", 0, 0},       {"#", 0, 0},            {"", 0, 0}};
+
+START_TEST(what_files_hold_in_place_of_numbers_is_read)
+{
+    for (size_t i = 0; i < sizeof specials / sizeof specials[0]; i++) {
+        const struct special *s = &specials[i];
+        unsigned char text[32] = {0};
+        double value = 0;
+        memcpy(text, s->text, strlen(s->text));
+        const unsigned char *after = number_scan_any(text, &value);
+        ck_assert_uint_eq(after ? (size_t)(after - text) : 0, s->length);
+        ck_assert(s->length == 0 || value == s->value || (isnan(value) && isnan(s->value)));
+    }
 }
 END_TEST
 
@@ -201,5 +213,5 @@ END_TEST
 
 TEST_SUITE("numbers", print_says_what_printf_says, print_says_what_printf_says_for_random_bits,
            scan_gives_back_every_float_that_print_wrote, scan_is_near_strtod_for_doubles,
-           scan_takes_every_spelling, scan_refuses_what_is_no_number, special_values_are_taken_apart,
+           scan_takes_every_spelling, scan_refuses_what_is_no_number, what_files_hold_in_place_of_numbers_is_read,
            integers_are_bounded)

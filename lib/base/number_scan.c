@@ -5,7 +5,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "strands/number.h"
+#include "base/number.h"
 
 static const double power_of_ten[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
                                         1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
@@ -125,13 +125,31 @@ static int matches(const unsigned char *text, const char *word)
     return 1;
 }
 
-const unsigned char *number_scan_special(const unsigned char *p, double *value)
+static const unsigned char *skip_word(const unsigned char *p)
+{
+    while (is_digit(*p) || (unsigned)(*p | 0x20) - 'a' < 26 || *p == '#' || *p == '(' || *p == ')')
+        p++;
+    return p;
+}
+
+static const unsigned char *scan_special(const unsigned char *p, double *value)
 {
     int negative = *p == '-';
     if (*p == '-' || *p == '+')
         p++;
     *value = matches(p, "nan") ? NAN : negative ? -INFINITY : INFINITY;
-    return matches(p, "nan") ? p + 3 : matches(p, "infinity") ? p + 8 : matches(p, "inf") ? p + 3 : NULL;
+    return matches(p, "nan") || matches(p, "inf") ? skip_word(p) : NULL;
+}
+
+const unsigned char *number_scan_any(const unsigned char *text, double *value)
+{
+    const unsigned char *after = number_scan_padded(text, value);
+    if (!after)
+        return scan_special(text, value);
+    if (*after != '#' || after[-1] != '.')
+        return after;
+    *value = NAN;
+    return skip_word(after);
 }
 
 const unsigned char *number_scan_integer(const unsigned char *p, long long *value)

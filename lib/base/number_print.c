@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "strands/number.h"
+#include "base/number.h"
 
 typedef unsigned __int128 u128;
 
