@@ -14,7 +14,8 @@ declare -A allowed=(
     [lib/geometry]="base geometry"
     [lib/strands]="base strands"
     [lib/model]="base geometry strands model"
-    [lib/fit]="base geometry strands model fit"
+    [lib/quality]="base geometry strands quality"
+    [lib/fit]="base geometry strands model quality fit"
     [lib/curvature]="base geometry strands model curvature"
     [lib/retarget]="base geometry strands model retarget"
     [lib/sample]="base geometry strands model sample"
@@ -24,7 +25,7 @@ declare -A room_of_header=(
     [status]=base [diag]=base [context]=base [random]=base [io]=base
     [mesh]=geometry [spatial]=geometry [scalp]=geometry [camera]=geometry
     [strands]=strands [format]=strands
-    [groom]=model [document]=model
+    [groom]=model [document]=model [quality]=quality
     [fit]=fit [sample]=sample [render]=render [curvature]=curvature [retarget]=retarget
 )
 

@@ -6,10 +6,10 @@
 #include <stdatomic.h>
 #include <string.h>
 
+#include "base/blas.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/progress.h"
-#include "fit/blas.h"
 
 #define ROWS_PER_PIECE 256
 #define CENTRES_PER_PIECE 16

@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/blas.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "fit/blas.h"
 #include "fit/dense.h"
 
 #define PI 3.14159265358979323846

@@ -14,9 +14,9 @@
 #include "base/progress.h"
 #include "fit/dense.h"
 #include "fit/loss_determinant.h"
-#include "fit/loss_wasserstein.h"
 #include "fit/matching.h"
 #include "groom/strands.h"
+#include "quality/loss_wasserstein.h"
 
 enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 

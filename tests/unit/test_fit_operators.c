@@ -5,13 +5,13 @@
 
 #include "fit/dense.h"
 #include "fit/loss_determinant.h"
-#include "fit/loss_wasserstein.h"
 #include "fit/moments.h"
 #include "fit/state.h"
 #include "groom/mesh.h"
 #include "groom/random.h"
 #include "groom/sample.h"
 #include "groom/strands.h"
+#include "quality/loss_wasserstein.h"
 #include "tests/support/test.h"
 
 static const struct groom_random_key key = {3, 700};

@@ -1,6 +1,6 @@
 /* How far apart two sets of strands are as distributions (Chang et al. 2025, Eqs. 11 and 12). */
-#ifndef FIT_LOSS_WASSERSTEIN_H
-#define FIT_LOSS_WASSERSTEIN_H
+#ifndef QUALITY_LOSS_WASSERSTEIN_H
+#define QUALITY_LOSS_WASSERSTEIN_H
 
 #include <stdint.h>
 

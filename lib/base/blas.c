@@ -1,4 +1,4 @@
-#include "fit/blas.h"
+#include "base/blas.h"
 
 #include <cblas.h>
 #include <pthread.h>

@@ -1,13 +1,13 @@
 /* The strand shape losses of Chang et al. 2025, Section 5.5: products of matrices and sorting. */
-#include "fit/loss_wasserstein.h"
+#include "quality/loss_wasserstein.h"
 
 #include <cblas.h>
 #include <math.h>
-#include <string.h>
 
+#include "base/blas.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "fit/blas.h"
+#include "quality/sort.h"
 
 #define DIRECTIONS_PER_PIECE 16
 #define STRANDS_PER_PIECE 256
@@ -15,38 +15,6 @@
 
 static uint32_t least(uint32_t a, uint32_t b) { return a < b ? a : b; }
 static uint32_t pieces_of(uint32_t n, uint32_t per_piece) { return n / per_piece + (n % per_piece != 0); }
-
-/* --- sorting ------------------------------------------------------------------------- */
-
-/* Floats as whole numbers of the same order, and back. */
-static uint32_t key_of(uint32_t bits) { return bits ^ (bits >> 31 ? 0xffffffffu : 0x80000000u); }
-static uint32_t bits_of_key(uint32_t key) { return key ^ (key >> 31 ? 0x80000000u : 0xffffffffu); }
-
-/* By digits of 11 bits, ascending; spare [n]. The same bits for any order of the input. */
-static void sort_floats(float *values, float *spare, uint32_t n)
-{
-    uint32_t *from = (uint32_t *)(void *)values, *to = (uint32_t *)(void *)spare;
-    for (uint32_t i = 0; i < n; i++) {
-        uint32_t bits;
-        memcpy(&bits, &values[i], sizeof bits);
-        from[i] = key_of(bits);
-    }
-    for (int shift = 0; shift < 33; shift += 11) {
-        uint32_t first[2049] = {0}, *swap = from;
-        for (uint32_t i = 0; i < n; i++)
-            first[(from[i] >> shift & 2047) + 1]++;
-        for (int d = 0; d < 2048; d++)
-            first[d + 1] += first[d];
-        for (uint32_t i = 0; i < n; i++)
-            to[first[from[i] >> shift & 2047]++] = from[i];
-        from = to;
-        to = swap;
-    }
-    for (uint32_t i = 0; i < n; i++) { /* after three passes they are in spare */
-        uint32_t bits = bits_of_key(from[i]);
-        memcpy(&values[i], &bits, sizeof bits);
-    }
-}
 
 /* --- Eq. 11 ----------------------------------------------------------------------------- */
 
