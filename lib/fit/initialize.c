@@ -10,10 +10,10 @@
 #include "base/progress.h"
 #include "fit/assign.h"
 #include "fit/estimate.h"
-#include "fit/kmeans.h"
 #include "fit/medoids.h"
 #include "fit/smooth.h"
 #include "fit/state.h"
+#include "geometry/kmeans.h"
 
 enum phase { SEED, CLUSTER, GUIDES, OPERATOR_GUIDES, INSTANCE, OPERATORS, ASSIGN, ENDED };
 

@@ -7,7 +7,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/progress.h"
-#include "fit/kmeans.h"
+#include "geometry/kmeans.h"
 
 #define ROWS_PER_PIECE 16
 #define NONE UINT32_MAX

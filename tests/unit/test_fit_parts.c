@@ -3,10 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fit/kmeans.h"
 #include "fit/medoids.h"
 #include "fit/simplex.h"
 #include "fit/smooth.h"
+#include "geometry/kmeans.h"
 #include "groom/random.h"
 #include "tests/support/test.h"
 

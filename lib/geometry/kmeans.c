@@ -1,5 +1,5 @@
 /* Lloyd's iteration: the distances of a piece of rows to all centres are one matrix product. */
-#include "fit/kmeans.h"
+#include "geometry/kmeans.h"
 
 #include <cblas.h>
 #include <math.h>

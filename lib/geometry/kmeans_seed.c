@@ -1,4 +1,4 @@
-#include "fit/kmeans.h"
+#include "geometry/kmeans.h"
 
 #include <string.h>
 

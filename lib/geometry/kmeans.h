@@ -2,8 +2,8 @@
  *
  * Deterministic for any pool. Rows are best centred and of a size near 1: distances are
  * |x|^2 - 2 x.c + |c|^2 in single precision. */
-#ifndef FIT_KMEANS_H
-#define FIT_KMEANS_H
+#ifndef GEOMETRY_KMEANS_H
+#define GEOMETRY_KMEANS_H
 
 #include <stdint.h>
 
