@@ -191,6 +191,81 @@ GROOM_MUST_CHECK groom_status groom_superhelices_sculpt(struct groom_superhelice
                                                         struct groom_sculpt_outcome *outcomes,
                                                         struct groom_diag *diag);
 
+/* --- armatures (Section 5.3) --------------------------------------------------------------- */
+
+#define GROOM_CLUSTERS_MOST 1024
+#define GROOM_CLUSTER_FRAMES_MOST 64 /* of each cluster */
+
+/* Strands by cluster: those of cluster k are strands[first[k]] .. strands[first[k+1] - 1], rising. */
+struct groom_clusters {
+    uint32_t n_clusters, n_strands;
+    uint32_t *of_strand; /* [n_strands] */
+    uint32_t *first;     /* [n_clusters + 1] */
+    uint32_t *strands;   /* [n_strands] */
+    const struct groom_allocator *allocator;
+};
+
+/* K-means over root and tip. Exactly `count` clusters; some are empty only where strands begin and end
+ * at fewer than `count` places. Of the polylines alone, so that they do not depend on how these are
+ * converted.
+ * returns  GROOM_OK, GROOM_EINVAL (diag points to /clusters/count: 1..GROOM_CLUSTERS_MOST, and no more than
+ *          strands; a strand without vertices or a root or tip that is not finite), GROOM_ENOMEM, GROOM_ECANCELLED
+ * threads  deterministic for any pool */
+GROOM_MUST_CHECK groom_status groom_strands_cluster(const struct groom_strands *strands, uint32_t count, uint64_t seed,
+                                                    const struct groom_context *context,
+                                                    struct groom_clusters **clusters, struct groom_diag *diag);
+void groom_clusters_destroy(struct groom_clusters *clusters); /* takes NULL */
+
+/* A joint of a cluster's armature: where its strands are at one fraction of their arc length. */
+struct groom_cluster_frame {
+    double at;         /* 0..1 */
+    double origin[3];  /* the mean of the cluster's points there, metres */
+    double axes[3][3]; /* rows, right-handed: along the mean strand; then the principal directions of the points across
+                          it, turned as little as may be from joint to joint */
+    double extent[3];  /* standard deviation of the points along each axis, metres */
+};
+
+/* The frames of every cluster, for drawing and for moving. An empty cluster's are at the origin with
+ * the world's axes and no extent. Points are those of the polylines: what a client does with a frame
+ * reaches the solver as an affine map (below), which does not depend on them.
+ * at       [n_frames] 0..1, rising; at most GROOM_CLUSTER_FRAMES_MOST
+ * frames   [n_clusters][n_frames], the caller's
+ * returns  GROOM_OK, GROOM_EINVAL (an `at` outside 0..1 or not rising; strands that the clusters are not of), GROOM_ENOMEM
+ * threads  deterministic for any pool */
+GROOM_MUST_CHECK groom_status groom_clusters_frames(const struct groom_clusters *clusters,
+                                                    const struct groom_strands *strands, const double *at,
+                                                    uint32_t n_frames, const struct groom_context *context,
+                                                    struct groom_cluster_frame *frames, struct groom_diag *diag);
+
+/* The affine map that takes one oriented frame to another: what a client that moves frames computes. */
+void groom_frame_map(const struct groom_cluster_frame *from, const struct groom_cluster_frame *to, double map[3][4]);
+
+/* One frame that was moved: the control points of its cluster at that arc length go where the map takes them. */
+struct groom_frame_move {
+    uint32_t cluster;
+    double at;        /* 0..1 of each strand's arc length */
+    double map[3][4]; /* x' = map[.][0..2] x + map[.][3]; metres */
+};
+
+struct groom_anchors {
+    size_t n;
+    struct groom_anchor *anchor; /* [n], by move, then by strand */
+    const struct groom_allocator *allocator;
+};
+
+/* Anchors for groom_superhelices_sculpt. Strands of no length cannot follow and get none.
+ * helices  the shapes that the maps apply to: at rest, not the last result of a drag
+ * returns  GROOM_OK, GROOM_EINVAL (diag points to /frames/i/cluster: there is no such cluster, or it is empty;
+ *          /frames/i/at; /frames/i/transform: a number that is not finite, or one that takes a point beyond what
+ *          can be counted; helices that the clusters are not of), GROOM_ENOMEM
+ * threads  deterministic for any pool */
+GROOM_MUST_CHECK groom_status groom_clusters_move(const struct groom_clusters *clusters,
+                                                  const struct groom_superhelices *helices,
+                                                  const struct groom_frame_move *moves, size_t n_moves,
+                                                  const struct groom_context *context,
+                                                  struct groom_anchors **anchors, struct groom_diag *diag);
+void groom_anchors_destroy(struct groom_anchors *anchors); /* takes NULL */
+
 /* --- analysis (Section 4) --------------------------------------------------------- */
 
 struct groom_analysis_options {
