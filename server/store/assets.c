@@ -46,10 +46,11 @@ groom_status store_asset_put(struct store *store, const struct store_asset *asse
 {
     char up[2] = {asset->up, 0};
     int64_t n_changed = 0;
-    groom_status status = transaction_begin(store, diag);
+    struct connection *c;
+    groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    struct query q = query_open(store,
+    struct query q = query_open(c,
                                 "INSERT INTO assets (id, kind, sha256, n_bytes, format, unit_m, up, name,"
                                 " metadata, created) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)"
                                 " ON CONFLICT (id) DO NOTHING", diag);
@@ -63,7 +64,7 @@ groom_status store_asset_put(struct store *store, const struct store_asset *asse
     query_text(&q, 8, asset->name ? asset->name : "");
     query_text(&q, 9, asset->metadata ? asset->metadata : "{}");
     query_integer(&q, 10, asset->created_ms ? asset->created_ms : store_now_ms());
-    status = transaction_end(store, query_run(&q, &n_changed), diag);
+    status = transaction_end(c, query_run(&q, &n_changed), diag);
     if (status == GROOM_OK && created)
         *created = n_changed == 1;
     return status;
@@ -74,14 +75,14 @@ groom_status store_asset_get(struct store *store, enum store_asset_kind kind, co
 {
     struct store_asset row = {0};
     bool found = false;
-    store_lock(store);
-    struct query q = query_open(store, "SELECT " COLUMNS " FROM assets WHERE id = ?1 AND kind = ?2", diag);
+    struct connection *c = read_begin(store);
+    struct query q = query_open(c, "SELECT " COLUMNS " FROM assets WHERE id = ?1 AND kind = ?2", diag);
     query_text(&q, 1, id);
     query_integer(&q, 2, kind);
     if ((found = query_row(&q)))
         read_asset(&q, &row);
     groom_status status = query_end(&q);
-    store_unlock(store);
+    read_end(c);
     if (status == GROOM_OK && !found)
         status = groom_fail(diag, GROOM_ENOTFOUND, "there is no %s %.40s",
                             kind == STORE_STRANDS ? "upload of strands" : "head", id);
@@ -97,8 +98,8 @@ groom_status store_assets_list(struct store *store, enum store_asset_kind kind, 
 {
     struct store_asset_list found = {0};
     int64_t last = 0;
-    store_lock(store);
-    struct query q = query_open(store, "SELECT " COLUMNS " FROM assets WHERE kind = ?1 AND seq < ?2"
+    struct connection *c = read_begin(store);
+    struct query q = query_open(c, "SELECT " COLUMNS " FROM assets WHERE kind = ?1 AND seq < ?2"
                                        " ORDER BY seq DESC LIMIT ?3", diag);
     query_integer(&q, 1, kind);
     query_integer(&q, 2, page_before(page));
@@ -113,7 +114,7 @@ groom_status store_assets_list(struct store *store, enum store_asset_kind kind, 
             last = read_asset(&q, asset);
     }
     groom_status status = query_end(&q);
-    store_unlock(store);
+    read_end(c);
     if (status == GROOM_OK)
         *list = found;
     else

@@ -17,10 +17,10 @@ const char *store_attempt_state_name(enum store_attempt_state state)
 /* --- the fence ------------------------------------------------------------------------- */
 
 /* An attempt may speak while it is running and is its job's last one. */
-static groom_status pass_fence(struct store *store, const struct store_attempt_ref *ref, bool *cancel,
+static groom_status pass_fence(struct connection *c, const struct store_attempt_ref *ref, bool *cancel,
                                struct groom_diag *diag)
 {
-    struct query q = query_open(store,
+    struct query q = query_open(c,
                                 "SELECT jobs.cancel_requested FROM attempts JOIN jobs ON jobs.id = attempts.job_id"
                                 " WHERE job_id = ?1 AND number = ?2 AND attempts.state = 0"
                                 " AND jobs.state = 1 AND jobs.attempt = number", diag);
@@ -40,8 +40,8 @@ groom_status store_attempt_find(struct store *store, const char *token_hash, str
                                 struct groom_diag *diag)
 {
     struct store_attempt_ref found = {0};
-    store_lock(store);
-    struct query q = query_open(store, "SELECT job_id, number FROM attempts WHERE token_hash = ?1", diag);
+    struct connection *c = read_begin(store);
+    struct query q = query_open(c, "SELECT job_id, number FROM attempts WHERE token_hash = ?1", diag);
     query_text(&q, 1, token_hash);
     if (query_row(&q)) {
         query_copy(&q, 0, found.job_id, sizeof found.job_id);
@@ -51,8 +51,8 @@ groom_status store_attempt_find(struct store *store, const char *token_hash, str
     if (status == GROOM_OK && found.number == 0)
         status = groom_fail(diag, GROOM_ENOTFOUND, "this token belongs to no attempt");
     if (status == GROOM_OK)
-        status = pass_fence(store, &found, NULL, diag);
-    store_unlock(store);
+        status = pass_fence(c, &found, NULL, diag);
+    read_end(c);
     if (status == GROOM_OK)
         *ref = found;
     return status;
@@ -61,22 +61,23 @@ groom_status store_attempt_find(struct store *store, const char *token_hash, str
 groom_status store_attempt_launched(struct store *store, const struct store_attempt_ref *ref, const char *handle,
                                     struct groom_diag *diag)
 {
-    groom_status status = transaction_begin(store, diag);
+    struct connection *c;
+    groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    struct query q = query_open(store, "UPDATE attempts SET handle = ?3 WHERE job_id = ?1 AND number = ?2", diag);
+    struct query q = query_open(c, "UPDATE attempts SET handle = ?3 WHERE job_id = ?1 AND number = ?2", diag);
     query_text(&q, 1, ref->job_id);
     query_integer(&q, 2, ref->number);
     query_text(&q, 3, handle);
-    return transaction_end(store, query_run(&q, NULL), diag);
+    return transaction_end(c, query_run(&q, NULL), diag);
 }
 
 /* --- what it reports --------------------------------------------------------------------- */
 
-static groom_status update_progress(struct store *store, const struct store_attempt_ref *ref,
+static groom_status update_progress(struct connection *c, const struct store_attempt_ref *ref,
                                     const struct store_progress *progress, struct groom_diag *diag)
 {
-    struct query q = query_open(store,
+    struct query q = query_open(c,
                                 "UPDATE jobs SET stage = coalesce(?2, stage),"
                                 " stage_index = CASE WHEN ?2 IS NULL THEN stage_index ELSE ?3 END,"
                                 " stage_count = CASE WHEN ?2 IS NULL THEN stage_count ELSE ?4 END,"
@@ -92,10 +93,10 @@ static groom_status update_progress(struct store *store, const struct store_atte
     return query_run(&q, NULL);
 }
 
-static groom_status insert_loss(struct store *store, const char *job_id, const struct store_loss *loss,
+static groom_status insert_loss(struct connection *c, const char *job_id, const struct store_loss *loss,
                                 struct groom_diag *diag)
 {
-    struct query q = query_open(store,
+    struct query q = query_open(c,
                                 "INSERT INTO losses (job_id, stage, name, iteration, value)"
                                 " VALUES (?1, ?2, ?3, ?4, ?5) ON CONFLICT (job_id, stage, name, iteration)"
                                 " DO UPDATE SET value = excluded.value", diag);
@@ -107,17 +108,17 @@ static groom_status insert_loss(struct store *store, const char *job_id, const s
     return query_run(&q, NULL);
 }
 
-static groom_status write_progress(struct store *store, const struct store_attempt_ref *ref,
+static groom_status write_progress(struct connection *c, const struct store_attempt_ref *ref,
                                    const struct store_progress *progress, bool *cancel, struct groom_diag *diag)
 {
     int64_t now = store_now_ms();
-    groom_status status = pass_fence(store, ref, cancel, diag);
+    groom_status status = pass_fence(c, ref, cancel, diag);
     if (status == GROOM_OK)
-        status = update_progress(store, ref, progress, diag);
+        status = update_progress(c, ref, progress, diag);
     for (size_t i = 0; status == GROOM_OK && i < progress->n_losses; i++)
-        status = insert_loss(store, ref->job_id, &progress->losses[i], diag);
+        status = insert_loss(c, ref->job_id, &progress->losses[i], diag);
     for (size_t i = 0; status == GROOM_OK && i < progress->n_events; i++)
-        status = event_append(store, ref->job_id, progress->events[i].type, progress->events[i].data, now, diag);
+        status = event_append(c, ref->job_id, progress->events[i].type, progress->events[i].data, now, diag);
     return status;
 }
 
@@ -125,10 +126,11 @@ groom_status store_attempt_progress(struct store *store, const struct store_atte
                                     const struct store_progress *progress, bool *cancel, struct groom_diag *diag)
 {
     bool asked = false;
-    groom_status status = transaction_begin(store, diag);
+    struct connection *c;
+    groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    status = transaction_end(store, write_progress(store, ref, progress, &asked, diag), diag);
+    status = transaction_end(c, write_progress(c, ref, progress, &asked, diag), diag);
     if (status == GROOM_OK)
         *cancel = asked;
     return status;
@@ -136,10 +138,10 @@ groom_status store_attempt_progress(struct store *store, const struct store_atte
 
 /* --- checkpoints ---------------------------------------------------------------------------- */
 
-static groom_status read_checkpoint(struct store *store, const char *job_id, struct store_checkpoint *checkpoint,
+static groom_status read_checkpoint(struct connection *c, const char *job_id, struct store_checkpoint *checkpoint,
                                     bool *found, struct groom_diag *diag)
 {
-    struct query q = query_open(store, "SELECT sha256, n_bytes, stage FROM checkpoints WHERE job_id = ?1", diag);
+    struct query q = query_open(c, "SELECT sha256, n_bytes, stage FROM checkpoints WHERE job_id = ?1", diag);
     query_text(&q, 1, job_id);
     if ((*found = query_row(&q))) {
         query_copy(&q, 0, checkpoint->sha256, sizeof checkpoint->sha256);
@@ -149,26 +151,26 @@ static groom_status read_checkpoint(struct store *store, const char *job_id, str
     return query_end(&q);
 }
 
-static groom_status forget_failures(struct store *store, const char *job_id, struct groom_diag *diag)
+static groom_status forget_failures(struct connection *c, const char *job_id, struct groom_diag *diag)
 {
-    struct query q = query_open(store, "UPDATE jobs SET n_failures = 0 WHERE id = ?1", diag);
+    struct query q = query_open(c, "UPDATE jobs SET n_failures = 0 WHERE id = ?1", diag);
     query_text(&q, 1, job_id);
     return query_run(&q, NULL);
 }
 
-static groom_status write_checkpoint(struct store *store, const struct store_attempt_ref *ref,
+static groom_status write_checkpoint(struct connection *c, const struct store_attempt_ref *ref,
                                      const struct store_checkpoint *checkpoint, struct store_checkpoint *before,
                                      struct groom_diag *diag)
 {
     bool found;
-    groom_status status = pass_fence(store, ref, NULL, diag);
+    groom_status status = pass_fence(c, ref, NULL, diag);
     if (status == GROOM_OK)
-        status = read_checkpoint(store, ref->job_id, before, &found, diag);
+        status = read_checkpoint(c, ref->job_id, before, &found, diag);
     if (status == GROOM_OK && strcmp(before->sha256, checkpoint->sha256) != 0)
-        status = forget_failures(store, ref->job_id, diag);
+        status = forget_failures(c, ref->job_id, diag);
     if (status != GROOM_OK)
         return status;
-    struct query q = query_open(store,
+    struct query q = query_open(c,
                                 "INSERT INTO checkpoints (job_id, sha256, n_bytes, stage, created)"
                                 " VALUES (?1, ?2, ?3, ?4, ?5) ON CONFLICT (job_id) DO UPDATE SET"
                                 " sha256 = ?2, n_bytes = ?3, stage = ?4, created = ?5", diag);
@@ -185,10 +187,11 @@ groom_status store_attempt_checkpoint(struct store *store, const struct store_at
                                       struct groom_diag *diag)
 {
     struct store_checkpoint before = {0};
-    groom_status status = transaction_begin(store, diag);
+    struct connection *c;
+    groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    status = transaction_end(store, write_checkpoint(store, ref, checkpoint, &before, diag), diag);
+    status = transaction_end(c, write_checkpoint(c, ref, checkpoint, &before, diag), diag);
     if (status == GROOM_OK) {
         bool same = strcmp(before.sha256, checkpoint->sha256) == 0;
         memcpy(replaced, same ? "" : before.sha256, same ? 1 : STORE_HASH_SIZE);
@@ -201,9 +204,9 @@ groom_status store_checkpoint_get(struct store *store, const char *job_id, struc
 {
     struct store_checkpoint row = {0};
     bool found = false;
-    store_lock(store);
-    groom_status status = read_checkpoint(store, job_id, &row, &found, diag);
-    store_unlock(store);
+    struct connection *c = read_begin(store);
+    groom_status status = read_checkpoint(c, job_id, &row, &found, diag);
+    read_end(c);
     if (status == GROOM_OK && !found)
         return groom_fail(diag, GROOM_ENOTFOUND, "the job %.40s has no checkpoint", job_id);
     if (status == GROOM_OK)
@@ -217,9 +220,9 @@ groom_status store_attempts_list(struct store *store, const char *job_id, struct
                                  struct groom_diag *diag)
 {
     struct store_attempt_list found = {0};
-    store_lock(store);
+    struct connection *c = read_begin(store);
     struct query q =
-        query_open(store, job_id ? "SELECT job_id, number, state, handle, last_words, started, finished"
+        query_open(c, job_id ? "SELECT job_id, number, state, handle, last_words, started, finished"
                                    " FROM attempts WHERE job_id = ?1 ORDER BY number"
                                  : "SELECT job_id, number, state, handle, last_words, started, finished"
                                    " FROM attempts WHERE state = 0 ORDER BY started, job_id", diag);
@@ -238,7 +241,7 @@ groom_status store_attempts_list(struct store *store, const char *job_id, struct
         attempt->finished_ms = query_int64(&q, 6);
     }
     groom_status status = query_end(&q);
-    store_unlock(store);
+    read_end(c);
     if (status == GROOM_OK)
         *list = found;
     else

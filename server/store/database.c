@@ -32,45 +32,75 @@ groom_status database_execute(sqlite3 *db, const char *sql, struct groom_diag *d
 
 /* --- transactions ------------------------------------------------------------------ */
 
-void store_lock(struct store *store) { pthread_mutex_lock(&store->lock); }
-void store_unlock(struct store *store) { pthread_mutex_unlock(&store->lock); }
-
-groom_status transaction_begin(struct store *store, struct groom_diag *diag)
+groom_status transaction_begin(struct store *store, struct connection **c, struct groom_diag *diag)
 {
-    store_lock(store);
-    groom_status status = database_execute(store->db, "BEGIN IMMEDIATE", diag);
+    pthread_mutex_lock(&store->writing);
+    groom_status status = database_execute(store->writer.db, "BEGIN IMMEDIATE", diag);
     if (status != GROOM_OK)
-        store_unlock(store);
+        pthread_mutex_unlock(&store->writing);
+    else
+        *c = &store->writer;
     return status;
 }
 
-groom_status transaction_end(struct store *store, groom_status status, struct groom_diag *diag)
+groom_status transaction_end(struct connection *c, groom_status status, struct groom_diag *diag)
 {
     if (status == GROOM_OK)
-        status = database_execute(store->db, "COMMIT", diag);
+        status = database_execute(c->db, "COMMIT", diag);
     /* some failures (a full disk) have rolled back already */
-    if (status != GROOM_OK && !sqlite3_get_autocommit(store->db))
-        sqlite3_exec(store->db, "ROLLBACK", NULL, NULL, NULL);
-    store_unlock(store);
+    if (status != GROOM_OK && !sqlite3_get_autocommit(c->db))
+        sqlite3_exec(c->db, "ROLLBACK", NULL, NULL, NULL);
+    pthread_mutex_unlock(&c->store->writing);
     return status;
+}
+
+static void step_once(struct connection *c, const char *sql)
+{
+    struct query q = query_open(c, sql, NULL);
+    query_row(&q);
+    groom_status status = query_end(&q);
+    (void)status; /* without it each statement sees a state of its own, or says why it sees none */
+}
+
+struct connection *read_begin(struct store *store)
+{
+    pthread_mutex_lock(&store->lock);
+    while (!store->free)
+        pthread_cond_wait(&store->freed, &store->lock);
+    struct connection *c = store->free;
+    store->free = c->next;
+    pthread_mutex_unlock(&store->lock);
+    step_once(c, "BEGIN");
+    return c;
+}
+
+void read_end(struct connection *c)
+{
+    struct store *store = c->store;
+    step_once(c, "COMMIT");
+    pthread_mutex_lock(&store->lock);
+    c->next = store->free;
+    store->free = c;
+    pthread_cond_signal(&store->freed);
+    pthread_mutex_unlock(&store->lock);
 }
 
 /* --- queries ------------------------------------------------------------------------ */
 
-static int prepare(struct store *store, const char *sql, sqlite3_stmt **statement)
+static int prepare(struct connection *c, const char *sql, sqlite3_stmt **statement)
 {
-    for (size_t i = 0; i < store->n_cached; i++) {
-        if (store->cache[i].sql == sql) {
-            *statement = store->cache[i].statement;
+    for (size_t i = 0; i < c->n_cached; i++) {
+        if (c->cache[i].sql == sql) {
+            *statement = c->cache[i].statement;
             return SQLITE_OK;
         }
     }
-    if (store->n_cached == DATABASE_MAX_STATEMENTS)
+    if (c->n_cached == DATABASE_MAX_STATEMENTS)
         return SQLITE_FULL;
-    int code = sqlite3_prepare_v3(store->db, sql, -1, SQLITE_PREPARE_PERSISTENT, statement, NULL);
+    int code = sqlite3_prepare_v3(c->db, sql, -1, SQLITE_PREPARE_PERSISTENT, statement, NULL);
     if (code == SQLITE_OK) {
-        store->cache[store->n_cached].sql = sql;
-        store->cache[store->n_cached++].statement = *statement;
+        c->cache[c->n_cached].sql = sql;
+        c->cache[c->n_cached++].statement = *statement;
     }
     return code;
 }
@@ -78,13 +108,13 @@ static int prepare(struct store *store, const char *sql, sqlite3_stmt **statemen
 static void note(struct query *q, int code)
 {
     if (code != SQLITE_OK && q->status == GROOM_OK)
-        q->status = database_fail(q->store->db, code, q->diag);
+        q->status = database_fail(q->connection->db, code, q->diag);
 }
 
-struct query query_open(struct store *store, const char *sql, struct groom_diag *diag)
+struct query query_open(struct connection *c, const char *sql, struct groom_diag *diag)
 {
-    struct query q = {.store = store, .status = GROOM_OK, .diag = diag};
-    note(&q, prepare(store, sql, &q.statement));
+    struct query q = {.connection = c, .status = GROOM_OK, .diag = diag};
+    note(&q, prepare(c, sql, &q.statement));
     return q;
 }
 
@@ -181,7 +211,7 @@ groom_status query_run(struct query *q, int64_t *n_changed)
     while (query_row(q))
         continue;
     if (n_changed)
-        *n_changed = q->status == GROOM_OK ? sqlite3_changes64(q->store->db) : 0;
+        *n_changed = q->status == GROOM_OK ? sqlite3_changes64(q->connection->db) : 0;
     return query_end(q);
 }
 

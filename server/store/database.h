@@ -1,9 +1,14 @@
-/* The store's own way to SQLite: one connection, one lock, queries with a sticky status.
+/* The store's own way to SQLite: one connection that writes, a few that read, queries with a sticky
+ * status.
+ *
+ * In WAL mode a reader sees what was committed when it began and waits for nobody, so that a look at a
+ * job does not stand behind another's fsync. SQLite 3.40 can damage a WAL where two connections write
+ * or checkpoint at the same instant: the writer alone does either; the others are opened read-only.
  *
  * A query goes on after a failure as if nothing had happened and says so at its end, so that a
  * function reads straight down:
  *
- *     struct query q = query_open(store, "SELECT name FROM grooms WHERE id = ?1", diag);
+ *     struct query q = query_open(c, "SELECT name FROM grooms WHERE id = ?1", diag);
  *     query_text(&q, 1, id);
  *     if (query_row(&q))
  *         name = query_string(&q, 0);
@@ -17,11 +22,15 @@
 
 #include "server/store/store.h"
 
-#define DATABASE_MAX_STATEMENTS 96
+#define DATABASE_MAX_STATEMENTS 192
 
-struct store {
+#define DATABASE_READERS        4
+
+/* One way to the database, one thread's at a time. */
+struct connection {
+    struct store *store;
     sqlite3 *db;
-    pthread_mutex_t lock;
+    struct connection *next; /* of the readers that nobody uses */
     /* Prepared once, found again by the address of their text. */
     struct {
         const char *sql;
@@ -30,32 +39,46 @@ struct store {
     size_t n_cached;
 };
 
+struct store {
+    pthread_mutex_t writing; /* writers take turns */
+    struct connection writer, readers[DATABASE_READERS];
+    pthread_mutex_t lock; /* of what follows */
+    pthread_cond_t freed;
+    struct connection *free;
+};
+
+/* The seam below: SQLite's "unix-excl", which keeps other processes out and the WAL's index in memory
+ * that only connections of this process share. A test names another before store_open. */
+extern const char *database_vfs;
+
 /* --- transactions ------------------------------------------------------------------ */
 
-/* Lock, and begin. On failure nothing is locked. */
-GROOM_MUST_CHECK groom_status transaction_begin(struct store *store, struct groom_diag *diag);
-/* Commit where `status` is GROOM_OK, else roll back; unlock. returns what became of it. */
-GROOM_MUST_CHECK groom_status transaction_end(struct store *store, groom_status status, struct groom_diag *diag);
-/* For what only reads, in one statement or several. */
-void store_lock(struct store *store);
-void store_unlock(struct store *store);
+/* Take the writer, and begin. On failure nothing is taken. */
+GROOM_MUST_CHECK groom_status transaction_begin(struct store *store, struct connection **c,
+                                                struct groom_diag *diag);
+/* Commit where `status` is GROOM_OK, else roll back; give it back. returns what became of it. */
+GROOM_MUST_CHECK groom_status transaction_end(struct connection *c, groom_status status,
+                                              struct groom_diag *diag);
+/* A reader for several statements that see one state of things. Waits only where all are in use. */
+struct connection *read_begin(struct store *store);
+void read_end(struct connection *c);
 
 /* A result code of SQLite as a status, with its words. */
 groom_status database_fail(sqlite3 *db, int code, struct groom_diag *diag);
 /* Several statements without parameters. */
 GROOM_MUST_CHECK groom_status database_execute(sqlite3 *db, const char *sql, struct groom_diag *diag);
 
-/* --- queries; the store is locked ------------------------------------------------------ */
+/* --- queries ---------------------------------------------------------------------- */
 
 struct query {
-    struct store *store;
+    struct connection *connection;
     sqlite3_stmt *statement;
     groom_status status;
     struct groom_diag *diag;
 };
 
 /* `sql` is a string literal. */
-struct query query_open(struct store *store, const char *sql, struct groom_diag *diag);
+struct query query_open(struct connection *c, const char *sql, struct groom_diag *diag);
 /* Bound bytes are borrowed until query_end. NULL binds NULL. */
 void query_text(struct query *q, int parameter, const char *text);
 void query_integer(struct query *q, int parameter, int64_t value);
@@ -86,9 +109,9 @@ extern const int schema_version;
 
 /* --- parts of larger transactions ----------------------------------------------------------- */
 
-groom_status groom_insert(struct store *store, const struct store_revision_new *revision, int64_t now,
+groom_status groom_insert(struct connection *c, const struct store_revision_new *revision, int64_t now,
                           struct groom_diag *diag);
-groom_status event_append(struct store *store, const char *job_id, const char *type, const char *data,
+groom_status event_append(struct connection *c, const char *job_id, const char *type, const char *data,
                           int64_t now, struct groom_diag *diag);
 /* The limit of a page, one more than asked for, so that a next page shows itself. */
 int64_t page_limit(struct store_page page);

@@ -3,15 +3,15 @@
 
 #include "server/store/database.h"
 
-groom_status event_append(struct store *store, const char *job_id, const char *type, const char *data,
+groom_status event_append(struct connection *c, const char *job_id, const char *type, const char *data,
                           int64_t now, struct groom_diag *diag)
 {
-    struct query count = query_open(store, "UPDATE jobs SET n_events = n_events + 1 WHERE id = ?1", diag);
+    struct query count = query_open(c, "UPDATE jobs SET n_events = n_events + 1 WHERE id = ?1", diag);
     query_text(&count, 1, job_id);
     groom_status status = query_run(&count, NULL);
     if (status != GROOM_OK)
         return status;
-    struct query q = query_open(store, "INSERT INTO events (job_id, sequence, type, data, created)"
+    struct query q = query_open(c, "INSERT INTO events (job_id, sequence, type, data, created)"
                                        " SELECT id, n_events, ?2, ?3, ?4 FROM jobs WHERE id = ?1", diag);
     query_text(&q, 1, job_id);
     query_text(&q, 2, type);
@@ -20,9 +20,9 @@ groom_status event_append(struct store *store, const char *job_id, const char *t
     return query_run(&q, NULL);
 }
 
-static groom_status job_exists(struct store *store, const char *job_id, struct groom_diag *diag)
+static groom_status job_exists(struct connection *c, const char *job_id, struct groom_diag *diag)
 {
-    struct query q = query_open(store, "SELECT 1 FROM jobs WHERE id = ?1", diag);
+    struct query q = query_open(c, "SELECT 1 FROM jobs WHERE id = ?1", diag);
     query_text(&q, 1, job_id);
     bool found = query_row(&q);
     groom_status status = query_end(&q);
@@ -31,10 +31,10 @@ static groom_status job_exists(struct store *store, const char *job_id, struct g
     return status;
 }
 
-static groom_status read_events(struct store *store, const char *job_id, int64_t after, uint32_t limit,
+static groom_status read_events(struct connection *c, const char *job_id, int64_t after, uint32_t limit,
                                 struct store_event_list *list, struct groom_diag *diag)
 {
-    struct query q = query_open(store, "SELECT sequence, type, data, created FROM events"
+    struct query q = query_open(c, "SELECT sequence, type, data, created FROM events"
                                        " WHERE job_id = ?1 AND sequence > ?2 ORDER BY sequence LIMIT ?3", diag);
     query_text(&q, 1, job_id);
     query_integer(&q, 2, after);
@@ -55,11 +55,11 @@ groom_status store_events_since(struct store *store, const char *job_id, int64_t
                                 struct store_event_list *list, struct groom_diag *diag)
 {
     struct store_event_list found = {0};
-    store_lock(store);
-    groom_status status = job_exists(store, job_id, diag);
+    struct connection *c = read_begin(store);
+    groom_status status = job_exists(c, job_id, diag);
     if (status == GROOM_OK)
-        status = read_events(store, job_id, after, limit, &found, diag);
-    store_unlock(store);
+        status = read_events(c, job_id, after, limit, &found, diag);
+    read_end(c);
     if (status == GROOM_OK)
         *list = found;
     else
@@ -79,10 +79,10 @@ void store_event_list_finish(struct store_event_list *list)
     *list = (struct store_event_list){0};
 }
 
-static groom_status read_losses(struct store *store, const char *job_id, struct store_loss_list *list,
+static groom_status read_losses(struct connection *c, const char *job_id, struct store_loss_list *list,
                                 struct groom_diag *diag)
 {
-    struct query q = query_open(store, "SELECT stage, iteration, name, value FROM losses WHERE job_id = ?1"
+    struct query q = query_open(c, "SELECT stage, iteration, name, value FROM losses WHERE job_id = ?1"
                                        " ORDER BY seq", diag);
     query_text(&q, 1, job_id);
     while (query_row(&q)) {
@@ -101,11 +101,11 @@ groom_status store_losses_list(struct store *store, const char *job_id, struct s
                                struct groom_diag *diag)
 {
     struct store_loss_list found = {0};
-    store_lock(store);
-    groom_status status = job_exists(store, job_id, diag);
+    struct connection *c = read_begin(store);
+    groom_status status = job_exists(c, job_id, diag);
     if (status == GROOM_OK)
-        status = read_losses(store, job_id, &found, diag);
-    store_unlock(store);
+        status = read_losses(c, job_id, &found, diag);
+    read_end(c);
     if (status == GROOM_OK)
         *list = found;
     else

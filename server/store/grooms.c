@@ -6,18 +6,18 @@
 
 /* --- writing: parts of a transaction ------------------------------------------------- */
 
-static groom_status insert_array(struct store *store, const struct store_array *array, struct groom_diag *diag)
+static groom_status insert_array(struct connection *c, const struct store_array *array, struct groom_diag *diag)
 {
-    struct query q = query_open(store, "INSERT INTO arrays (sha256, bytes) VALUES (?1, ?2)"
+    struct query q = query_open(c, "INSERT INTO arrays (sha256, bytes) VALUES (?1, ?2)"
                                        " ON CONFLICT (sha256) DO NOTHING", diag);
     query_text(&q, 1, array->sha256);
     query_bytes(&q, 2, array->bytes, array->n_bytes);
     return query_run(&q, NULL);
 }
 
-static groom_status array_is_stored(struct store *store, const char *sha256, struct groom_diag *diag)
+static groom_status array_is_stored(struct connection *c, const char *sha256, struct groom_diag *diag)
 {
-    struct query q = query_open(store, "SELECT 1 FROM arrays WHERE sha256 = ?1", diag);
+    struct query q = query_open(c, "SELECT 1 FROM arrays WHERE sha256 = ?1", diag);
     query_text(&q, 1, sha256);
     bool found = query_row(&q);
     groom_status status = query_end(&q);
@@ -26,10 +26,10 @@ static groom_status array_is_stored(struct store *store, const char *sha256, str
     return status;
 }
 
-static groom_status refer_to_array(struct store *store, const struct store_revision_new *revision,
+static groom_status refer_to_array(struct connection *c, const struct store_revision_new *revision,
                                    uint32_t number, const char *sha256, struct groom_diag *diag)
 {
-    struct query q = query_open(store, "INSERT INTO revision_arrays (groom_id, number, sha256)"
+    struct query q = query_open(c, "INSERT INTO revision_arrays (groom_id, number, sha256)"
                                        " VALUES (?1, ?2, ?3) ON CONFLICT DO NOTHING", diag);
     query_text(&q, 1, revision->groom_id);
     query_integer(&q, 2, number);
@@ -37,10 +37,10 @@ static groom_status refer_to_array(struct store *store, const struct store_revis
     return query_run(&q, NULL);
 }
 
-static groom_status insert_revision(struct store *store, const struct store_revision_new *revision,
+static groom_status insert_revision(struct connection *c, const struct store_revision_new *revision,
                                     uint32_t number, int64_t now, struct groom_diag *diag)
 {
-    struct query q = query_open(store,
+    struct query q = query_open(c,
                                 "INSERT INTO revisions (groom_id, number, parent, name, document, note, created)"
                                 " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)", diag);
     query_text(&q, 1, revision->groom_id);
@@ -53,18 +53,18 @@ static groom_status insert_revision(struct store *store, const struct store_revi
     groom_status status = query_run(&q, NULL);
     for (size_t i = 0; status == GROOM_OK && i < revision->n_arrays; i++) {
         const struct store_array *array = &revision->arrays[i];
-        status = array->bytes ? insert_array(store, array, diag) : array_is_stored(store, array->sha256, diag);
+        status = array->bytes ? insert_array(c, array, diag) : array_is_stored(c, array->sha256, diag);
         if (status == GROOM_OK)
-            status = refer_to_array(store, revision, number, array->sha256, diag);
+            status = refer_to_array(c, revision, number, array->sha256, diag);
     }
     return status;
 }
 
-groom_status groom_insert(struct store *store, const struct store_revision_new *revision, int64_t now,
+groom_status groom_insert(struct connection *c, const struct store_revision_new *revision, int64_t now,
                           struct groom_diag *diag)
 {
     int64_t n_changed = 0;
-    struct query q = query_open(store, "INSERT INTO grooms (id, name, latest, created, changed)"
+    struct query q = query_open(c, "INSERT INTO grooms (id, name, latest, created, changed)"
                                        " VALUES (?1, ?2, 1, ?3, ?3) ON CONFLICT (id) DO NOTHING", diag);
     query_text(&q, 1, revision->groom_id);
     query_text(&q, 2, revision->name ? revision->name : "");
@@ -72,22 +72,23 @@ groom_status groom_insert(struct store *store, const struct store_revision_new *
     groom_status status = query_run(&q, &n_changed);
     if (status == GROOM_OK && n_changed == 0)
         status = groom_fail(diag, GROOM_ECONFLICT, "there is a groom %.40s already", revision->groom_id);
-    return status == GROOM_OK ? insert_revision(store, revision, 1, now, diag) : status;
+    return status == GROOM_OK ? insert_revision(c, revision, 1, now, diag) : status;
 }
 
 groom_status store_groom_create(struct store *store, const struct store_revision_new *revision,
                                 struct groom_diag *diag)
 {
-    groom_status status = transaction_begin(store, diag);
+    struct connection *c;
+    groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    return transaction_end(store, groom_insert(store, revision, store_now_ms(), diag), diag);
+    return transaction_end(c, groom_insert(c, revision, store_now_ms(), diag), diag);
 }
 
-static groom_status read_latest(struct store *store, const char *groom_id, uint32_t *latest,
+static groom_status read_latest(struct connection *c, const char *groom_id, uint32_t *latest,
                                 struct groom_diag *diag)
 {
-    struct query q = query_open(store, "SELECT latest FROM grooms WHERE id = ?1", diag);
+    struct query q = query_open(c, "SELECT latest FROM grooms WHERE id = ?1", diag);
     query_text(&q, 1, groom_id);
     bool found = query_row(&q);
     if (found)
@@ -98,10 +99,10 @@ static groom_status read_latest(struct store *store, const char *groom_id, uint3
     return status;
 }
 
-static groom_status advance_groom(struct store *store, const struct store_revision_new *revision,
+static groom_status advance_groom(struct connection *c, const struct store_revision_new *revision,
                                   uint32_t number, int64_t now, struct groom_diag *diag)
 {
-    struct query q = query_open(store, "UPDATE grooms SET latest = ?2, name = ?3, changed = ?4 WHERE id = ?1",
+    struct query q = query_open(c, "UPDATE grooms SET latest = ?2, name = ?3, changed = ?4 WHERE id = ?1",
                                 diag);
     query_text(&q, 1, revision->groom_id);
     query_integer(&q, 2, number);
@@ -110,29 +111,30 @@ static groom_status advance_groom(struct store *store, const struct store_revisi
     return query_run(&q, NULL);
 }
 
-static groom_status add_revision(struct store *store, const struct store_revision_new *revision,
+static groom_status add_revision(struct connection *c, const struct store_revision_new *revision,
                                  uint32_t expected_latest, struct groom_diag *diag)
 {
     uint32_t latest = 0;
     int64_t now = store_now_ms();
-    groom_status status = read_latest(store, revision->groom_id, &latest, diag);
+    groom_status status = read_latest(c, revision->groom_id, &latest, diag);
     if (status != GROOM_OK)
         return status;
     if (latest != expected_latest)
         return groom_fail(diag, GROOM_ECONFLICT,
                           "the groom is at revision %u by now, not %u: get it and edit that", latest,
                           expected_latest);
-    status = advance_groom(store, revision, latest + 1, now, diag);
-    return status == GROOM_OK ? insert_revision(store, revision, latest + 1, now, diag) : status;
+    status = advance_groom(c, revision, latest + 1, now, diag);
+    return status == GROOM_OK ? insert_revision(c, revision, latest + 1, now, diag) : status;
 }
 
 groom_status store_revision_add(struct store *store, const struct store_revision_new *revision,
                                 uint32_t expected_latest, struct groom_diag *diag)
 {
-    groom_status status = transaction_begin(store, diag);
+    struct connection *c;
+    groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    return transaction_end(store, add_revision(store, revision, expected_latest, diag), diag);
+    return transaction_end(c, add_revision(c, revision, expected_latest, diag), diag);
 }
 
 /* --- reading --------------------------------------------------------------------------- */
@@ -155,10 +157,10 @@ groom_status store_revision_get(struct store *store, const char *groom_id, uint3
     struct store_revision row = {0};
     uint32_t latest = 0;
     bool found = false;
-    store_lock(store);
-    groom_status status = read_latest(store, groom_id, &latest, diag);
+    struct connection *c = read_begin(store);
+    groom_status status = read_latest(c, groom_id, &latest, diag);
     if (status == GROOM_OK) {
-        struct query q = query_open(store,
+        struct query q = query_open(c,
                                     "SELECT groom_id, number, parent, ?3, name, note, created, document"
                                     " FROM revisions WHERE groom_id = ?1 AND number = ?2", diag);
         query_text(&q, 1, groom_id);
@@ -171,7 +173,7 @@ groom_status store_revision_get(struct store *store, const char *groom_id, uint3
             status = groom_fail(diag, GROOM_ENOTFOUND, "the groom %.40s has revisions 1 to %u, not %u", groom_id,
                                 latest, number);
     }
-    store_unlock(store);
+    read_end(c);
     if (status == GROOM_OK)
         *revision = row;
     else
@@ -185,8 +187,8 @@ groom_status store_array_get(struct store *store, const char *sha256, void **byt
     void *copy = NULL;
     size_t n = 0;
     bool found;
-    store_lock(store);
-    struct query q = query_open(store, "SELECT bytes FROM arrays WHERE sha256 = ?1", diag);
+    struct connection *c = read_begin(store);
+    struct query q = query_open(c, "SELECT bytes FROM arrays WHERE sha256 = ?1", diag);
     query_text(&q, 1, sha256);
     if ((found = query_row(&q))) {
         const void *stored = sqlite3_column_blob(q.statement, 0);
@@ -195,7 +197,7 @@ groom_status store_array_get(struct store *store, const char *sha256, void **byt
             memcpy(copy, stored, n);
     }
     groom_status status = query_end(&q);
-    store_unlock(store);
+    read_end(c);
     if (status == GROOM_OK && !found)
         status = groom_fail(diag, GROOM_ENOTFOUND, "there is no array %.64s", sha256);
     else if (status == GROOM_OK && !copy)
@@ -214,10 +216,10 @@ groom_status store_revisions_list(struct store *store, const char *groom_id, str
 {
     struct store_revision_list found = {0};
     uint32_t latest = 0;
-    store_lock(store);
-    groom_status status = read_latest(store, groom_id, &latest, diag);
+    struct connection *c = read_begin(store);
+    groom_status status = read_latest(c, groom_id, &latest, diag);
     if (status == GROOM_OK) {
-        struct query q = query_open(store,
+        struct query q = query_open(c,
                                     "SELECT groom_id, number, parent, ?4, name, note, created, NULL"
                                     " FROM revisions WHERE groom_id = ?1 AND number < ?2"
                                     " ORDER BY number DESC LIMIT ?3", diag);
@@ -236,7 +238,7 @@ groom_status store_revisions_list(struct store *store, const char *groom_id, str
         }
         status = query_end(&q);
     }
-    store_unlock(store);
+    read_end(c);
     if (status == GROOM_OK)
         *list = found;
     else
@@ -249,8 +251,8 @@ groom_status store_grooms_list(struct store *store, struct store_page page, stru
 {
     struct store_groom_list found = {0};
     int64_t last = 0;
-    store_lock(store);
-    struct query q = query_open(store, "SELECT seq, id, name, latest, created, changed FROM grooms"
+    struct connection *c = read_begin(store);
+    struct query q = query_open(c, "SELECT seq, id, name, latest, created, changed FROM grooms"
                                        " WHERE seq < ?1 ORDER BY seq DESC LIMIT ?2", diag);
     query_integer(&q, 1, page_before(page));
     query_integer(&q, 2, page_limit(page));
@@ -270,7 +272,7 @@ groom_status store_grooms_list(struct store *store, struct store_page page, stru
         groom->changed_ms = query_int64(&q, 5);
     }
     groom_status status = query_end(&q);
-    store_unlock(store);
+    read_end(c);
     if (status == GROOM_OK)
         *list = found;
     else

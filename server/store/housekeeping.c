@@ -1,9 +1,9 @@
 /* Counts for /metrics, and what keeps a blob alive. */
 #include "server/store/database.h"
 
-static groom_status count_jobs(struct store *store, struct store_counts *counts, struct groom_diag *diag)
+static groom_status count_jobs(struct connection *c, struct store_counts *counts, struct groom_diag *diag)
 {
-    struct query q = query_open(store, "SELECT state, count(*) FROM jobs GROUP BY state", diag);
+    struct query q = query_open(c, "SELECT state, count(*) FROM jobs GROUP BY state", diag);
     while (query_row(&q)) {
         int64_t state = query_int64(&q, 0);
         if (state >= 0 && state < STORE_JOB_STATES)
@@ -15,10 +15,10 @@ static groom_status count_jobs(struct store *store, struct store_counts *counts,
 groom_status store_count(struct store *store, struct store_counts *counts, struct groom_diag *diag)
 {
     struct store_counts found = {0};
-    store_lock(store);
-    groom_status status = count_jobs(store, &found, diag);
+    struct connection *c = read_begin(store);
+    groom_status status = count_jobs(c, &found, diag);
     if (status == GROOM_OK) {
-        struct query q = query_open(store,
+        struct query q = query_open(c,
                                     "SELECT (SELECT count(*) FROM assets WHERE kind = 0),"
                                     " (SELECT count(*) FROM assets WHERE kind = 1),"
                                     " (SELECT count(*) FROM grooms), (SELECT count(*) FROM revisions),"
@@ -32,7 +32,7 @@ groom_status store_count(struct store *store, struct store_counts *counts, struc
         }
         status = query_end(&q);
     }
-    store_unlock(store);
+    read_end(c);
     if (status == GROOM_OK)
         *counts = found;
     return status;
@@ -42,13 +42,13 @@ groom_status store_blob_referenced(struct store *store, const char *sha256, bool
                                    struct groom_diag *diag)
 {
     bool found;
-    store_lock(store);
-    struct query q = query_open(store, "SELECT 1 FROM assets WHERE sha256 = ?1 UNION ALL"
+    struct connection *c = read_begin(store);
+    struct query q = query_open(c, "SELECT 1 FROM assets WHERE sha256 = ?1 UNION ALL"
                                        " SELECT 1 FROM checkpoints WHERE sha256 = ?1 LIMIT 1", diag);
     query_text(&q, 1, sha256);
     found = query_row(&q);
     groom_status status = query_end(&q);
-    store_unlock(store);
+    read_end(c);
     if (status == GROOM_OK)
         *referenced = found;
     return status;

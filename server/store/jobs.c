@@ -31,11 +31,11 @@ bool store_job_state_is_end(enum store_job_state state) { return state >= STORE_
 
 /* --- creating ------------------------------------------------------------------------- */
 
-static groom_status find_key(struct store *store, const struct store_job_new *job, char id[STORE_ID_SIZE],
+static groom_status find_key(struct connection *c, const struct store_job_new *job, char id[STORE_ID_SIZE],
                              bool *known, struct groom_diag *diag)
 {
     char hash[STORE_HASH_SIZE] = "";
-    struct query q = query_open(store, "SELECT job_id, request_hash FROM idempotency_keys WHERE key = ?1", diag);
+    struct query q = query_open(c, "SELECT job_id, request_hash FROM idempotency_keys WHERE key = ?1", diag);
     query_text(&q, 1, job->idempotency_key);
     if ((*known = query_row(&q))) {
         query_copy(&q, 0, id, STORE_ID_SIZE);
@@ -48,10 +48,10 @@ static groom_status find_key(struct store *store, const struct store_job_new *jo
     return status;
 }
 
-static groom_status insert_key(struct store *store, const struct store_job_new *job, int64_t now,
+static groom_status insert_key(struct connection *c, const struct store_job_new *job, int64_t now,
                                struct groom_diag *diag)
 {
-    struct query q = query_open(store, "INSERT INTO idempotency_keys (key, request_hash, job_id, created)"
+    struct query q = query_open(c, "INSERT INTO idempotency_keys (key, request_hash, job_id, created)"
                                        " VALUES (?1, ?2, ?3, ?4)", diag);
     query_text(&q, 1, job->idempotency_key);
     query_text(&q, 2, job->request_hash);
@@ -60,10 +60,10 @@ static groom_status insert_key(struct store *store, const struct store_job_new *
     return query_run(&q, NULL);
 }
 
-static groom_status insert_job(struct store *store, const struct store_job_new *job, int64_t now,
+static groom_status insert_job(struct connection *c, const struct store_job_new *job, int64_t now,
                                struct groom_diag *diag)
 {
-    struct query q = query_open(store, "INSERT INTO jobs (id, kind, state, priority, request, options, created)"
+    struct query q = query_open(c, "INSERT INTO jobs (id, kind, state, priority, request, options, created)"
                                        " VALUES (?1, ?2, 0, ?3, ?4, ?5, ?6)", diag);
     query_text(&q, 1, job->id);
     query_text(&q, 2, job->kind);
@@ -73,8 +73,8 @@ static groom_status insert_job(struct store *store, const struct store_job_new *
     query_integer(&q, 6, now);
     groom_status status = query_run(&q, NULL);
     if (status == GROOM_OK && job->idempotency_key)
-        status = insert_key(store, job, now, diag);
-    return status == GROOM_OK ? event_append(store, job->id, "state", "{\"state\":\"queued\"}", now, diag) : status;
+        status = insert_key(c, job, now, diag);
+    return status == GROOM_OK ? event_append(c, job->id, "state", "{\"state\":\"queued\"}", now, diag) : status;
 }
 
 groom_status store_job_create(struct store *store, const struct store_job_new *job, char id[STORE_ID_SIZE],
@@ -84,14 +84,15 @@ groom_status store_job_create(struct store *store, const struct store_job_new *j
     bool known = false;
     strncpy(known_id, job->id, sizeof known_id - 1);
     known_id[sizeof known_id - 1] = 0;
-    groom_status status = transaction_begin(store, diag);
+    struct connection *c;
+    groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
     if (job->idempotency_key)
-        status = find_key(store, job, known_id, &known, diag);
+        status = find_key(c, job, known_id, &known, diag);
     if (status == GROOM_OK && !known)
-        status = insert_job(store, job, store_now_ms(), diag);
-    if ((status = transaction_end(store, status, diag)) == GROOM_OK) {
+        status = insert_job(c, job, store_now_ms(), diag);
+    if ((status = transaction_end(c, status, diag)) == GROOM_OK) {
         memcpy(id, known_id, STORE_ID_SIZE);
         *created = !known;
     }
@@ -138,13 +139,13 @@ groom_status store_job_get(struct store *store, const char *id, struct store_job
 {
     struct store_job row = {0};
     bool found;
-    store_lock(store);
-    struct query q = query_open(store, SELECT_JOB "WHERE id = ?1", diag);
+    struct connection *c = read_begin(store);
+    struct query q = query_open(c, SELECT_JOB "WHERE id = ?1", diag);
     query_text(&q, 1, id);
     if ((found = query_row(&q)))
         read_job(&q, &row);
     groom_status status = query_end(&q);
-    store_unlock(store);
+    read_end(c);
     if (status == GROOM_OK && !found)
         status = groom_fail(diag, GROOM_ENOTFOUND, "there is no job %.40s", id);
     if (status == GROOM_OK)
@@ -159,8 +160,8 @@ groom_status store_jobs_list(struct store *store, const enum store_job_state *st
 {
     struct store_job_list found = {0};
     int64_t last = 0;
-    store_lock(store);
-    struct query q = query_open(store, state ? SELECT_JOB "WHERE seq < ?1 AND state = ?3 ORDER BY seq DESC LIMIT ?2"
+    struct connection *c = read_begin(store);
+    struct query q = query_open(c, state ? SELECT_JOB "WHERE seq < ?1 AND state = ?3 ORDER BY seq DESC LIMIT ?2"
                                              : SELECT_JOB "WHERE seq < ?1 ORDER BY seq DESC LIMIT ?2", diag);
     query_integer(&q, 1, page_before(page));
     query_integer(&q, 2, page_limit(page));
@@ -176,7 +177,7 @@ groom_status store_jobs_list(struct store *store, const enum store_job_state *st
             last = read_job(&q, job);
     }
     groom_status status = query_end(&q);
-    store_unlock(store);
+    read_end(c);
     if (status == GROOM_OK)
         *list = found;
     else
@@ -212,10 +213,11 @@ groom_status store_job_request_cancel(struct store *store, const char *id, enum 
                                       struct groom_diag *diag)
 {
     bool found;
-    groom_status status = transaction_begin(store, diag);
+    struct connection *c;
+    groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    struct query q = query_open(store, "UPDATE jobs SET cancel_requested = cancel_requested OR state = 1"
+    struct query q = query_open(c, "UPDATE jobs SET cancel_requested = cancel_requested OR state = 1"
                                        " WHERE id = ?1 RETURNING state", diag);
     query_text(&q, 1, id);
     if ((found = query_row(&q)))
@@ -223,5 +225,5 @@ groom_status store_job_request_cancel(struct store *store, const char *id, enum 
     status = query_end(&q);
     if (status == GROOM_OK && !found)
         status = groom_fail(diag, GROOM_ENOTFOUND, "there is no job %.40s", id);
-    return transaction_end(store, status, diag);
+    return transaction_end(c, status, diag);
 }

@@ -17,10 +17,10 @@ static bool allowed(enum store_job_state from, enum store_job_state to)
 
 /* --- taking --------------------------------------------------------------------------- */
 
-static groom_status take_first(struct store *store, int64_t now, struct store_attempt_ref *ref,
+static groom_status take_first(struct connection *c, int64_t now, struct store_attempt_ref *ref,
                                struct groom_diag *diag)
 {
-    struct query q = query_open(store,
+    struct query q = query_open(c,
                                 "UPDATE jobs SET state = 1, attempt = attempt + 1,"
                                 " started = CASE started WHEN 0 THEN ?1 ELSE started END"
                                 " WHERE seq = (SELECT seq FROM jobs WHERE state = 0 AND not_before <= ?1"
@@ -33,11 +33,11 @@ static groom_status take_first(struct store *store, int64_t now, struct store_at
     return query_end(&q);
 }
 
-static groom_status insert_attempt(struct store *store, const struct store_attempt_ref *ref,
+static groom_status insert_attempt(struct connection *c, const struct store_attempt_ref *ref,
                                    const char *token_hash, int64_t now, struct groom_diag *diag)
 {
     char data[96];
-    struct query q = query_open(store, "INSERT INTO attempts (job_id, number, token_hash, state, started)"
+    struct query q = query_open(c, "INSERT INTO attempts (job_id, number, token_hash, state, started)"
                                        " VALUES (?1, ?2, ?3, 0, ?4)", diag);
     query_text(&q, 1, ref->job_id);
     query_integer(&q, 2, ref->number);
@@ -47,12 +47,12 @@ static groom_status insert_attempt(struct store *store, const struct store_attem
     if (status != GROOM_OK)
         return status;
     snprintf(data, sizeof data, "{\"state\":\"running\",\"attempt\":%u}", ref->number);
-    return event_append(store, ref->job_id, "state", data, now, diag);
+    return event_append(c, ref->job_id, "state", data, now, diag);
 }
 
-static groom_status read_next_time(struct store *store, int64_t *next_ms, struct groom_diag *diag)
+static groom_status read_next_time(struct connection *c, int64_t *next_ms, struct groom_diag *diag)
 {
-    struct query q = query_open(store, "SELECT coalesce(min(not_before), 0) FROM jobs WHERE state = 0", diag);
+    struct query q = query_open(c, "SELECT coalesce(min(not_before), 0) FROM jobs WHERE state = 0", diag);
     if (query_row(&q))
         *next_ms = query_int64(&q, 0);
     return query_end(&q);
@@ -63,14 +63,15 @@ groom_status store_job_take(struct store *store, const char *token_hash, struct 
 {
     struct store_attempt_ref found = {0};
     int64_t next = 0, now = store_now_ms();
-    groom_status status = transaction_begin(store, diag);
+    struct connection *c;
+    groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    status = take_first(store, now, &found, diag);
+    status = take_first(c, now, &found, diag);
     if (status == GROOM_OK)
-        status = found.number ? insert_attempt(store, &found, token_hash, now, diag)
-                              : read_next_time(store, &next, diag);
-    if ((status = transaction_end(store, status, diag)) != GROOM_OK)
+        status = found.number ? insert_attempt(c, &found, token_hash, now, diag)
+                              : read_next_time(c, &next, diag);
+    if ((status = transaction_end(c, status, diag)) != GROOM_OK)
         return status;
     *taken = found.number > 0;
     *ref = found;
@@ -86,10 +87,10 @@ struct present {
     bool cancel_requested;
 };
 
-static groom_status read_present(struct store *store, const char *job_id, struct present *present,
+static groom_status read_present(struct connection *c, const char *job_id, struct present *present,
                                  struct groom_diag *diag)
 {
-    struct query q = query_open(store, "SELECT state, attempt, cancel_requested FROM jobs WHERE id = ?1", diag);
+    struct query q = query_open(c, "SELECT state, attempt, cancel_requested FROM jobs WHERE id = ?1", diag);
     query_text(&q, 1, job_id);
     bool found = query_row(&q);
     if (found) {
@@ -120,11 +121,11 @@ static groom_status check_move(const struct store_job_move *move, const struct p
     return GROOM_OK;
 }
 
-static groom_status end_attempt(struct store *store, const struct store_job_move *move, int64_t now,
+static groom_status end_attempt(struct connection *c, const struct store_job_move *move, int64_t now,
                                 struct groom_diag *diag)
 {
     int64_t n_changed = 0;
-    struct query q = query_open(store, "UPDATE attempts SET state = ?3, last_words = ?4, finished = ?5"
+    struct query q = query_open(c, "UPDATE attempts SET state = ?3, last_words = ?4, finished = ?5"
                                        " WHERE job_id = ?1 AND number = ?2 AND state = 0", diag);
     query_text(&q, 1, move->job_id);
     query_integer(&q, 2, move->attempt);
@@ -137,11 +138,11 @@ static groom_status end_attempt(struct store *store, const struct store_job_move
     return status;
 }
 
-static groom_status update_job(struct store *store, const struct store_job_move *move, int64_t now,
+static groom_status update_job(struct connection *c, const struct store_job_move *move, int64_t now,
                                struct groom_diag *diag)
 {
     bool end = store_job_state_is_end(move->to);
-    struct query q = query_open(store,
+    struct query q = query_open(c,
                                 "UPDATE jobs SET state = ?2, not_before = ?3, n_failures = n_failures + ?4,"
                                 " result = ?5, error = ?6, finished = ?7, eta_s = -1,"
                                 " progress = CASE ?2 WHEN 2 THEN 1.0 ELSE progress END WHERE id = ?1", diag);
@@ -156,7 +157,7 @@ static groom_status update_job(struct store *store, const struct store_job_move 
 }
 
 /* {"state":…,"attempt":N,"result":{…},"error":{…}} */
-static groom_status append_state_event(struct store *store, const struct store_job_move *move, uint32_t attempt,
+static groom_status append_state_event(struct connection *c, const struct store_job_move *move, uint32_t attempt,
                                        int64_t now, struct groom_diag *diag)
 {
     size_t size = 128 + (move->result ? strlen(move->result) : 0) + (move->error ? strlen(move->error) : 0);
@@ -169,39 +170,39 @@ static groom_status append_state_event(struct store *store, const struct store_j
     if (move->error)
         n += snprintf(data + n, size - (size_t)n, ",\"error\":%s", move->error);
     snprintf(data + n, size - (size_t)n, "}");
-    groom_status status = event_append(store, move->job_id, "state", data, now, diag);
+    groom_status status = event_append(c, move->job_id, "state", data, now, diag);
     free(data);
     return status;
 }
 
-static groom_status drop_checkpoint(struct store *store, const char *job_id, char garbage[STORE_HASH_SIZE],
+static groom_status drop_checkpoint(struct connection *c, const char *job_id, char garbage[STORE_HASH_SIZE],
                                     struct groom_diag *diag)
 {
-    struct query q = query_open(store, "DELETE FROM checkpoints WHERE job_id = ?1 RETURNING sha256", diag);
+    struct query q = query_open(c, "DELETE FROM checkpoints WHERE job_id = ?1 RETURNING sha256", diag);
     query_text(&q, 1, job_id);
     if (query_row(&q))
         query_copy(&q, 0, garbage, STORE_HASH_SIZE);
     return query_run(&q, NULL);
 }
 
-static groom_status write_move(struct store *store, const struct store_job_move *move,
+static groom_status write_move(struct connection *c, const struct store_job_move *move,
                                char garbage[STORE_HASH_SIZE], struct groom_diag *diag)
 {
     struct present present = {0};
     int64_t now = store_now_ms();
-    groom_status status = read_present(store, move->job_id, &present, diag);
+    groom_status status = read_present(c, move->job_id, &present, diag);
     if (status == GROOM_OK)
         status = check_move(move, &present, diag);
     if (status == GROOM_OK && move->attempt != 0)
-        status = end_attempt(store, move, now, diag);
+        status = end_attempt(c, move, now, diag);
     if (status == GROOM_OK && move->groom)
-        status = groom_insert(store, move->groom, now, diag);
+        status = groom_insert(c, move->groom, now, diag);
     if (status == GROOM_OK)
-        status = update_job(store, move, now, diag);
+        status = update_job(c, move, now, diag);
     if (status == GROOM_OK)
-        status = append_state_event(store, move, present.attempt, now, diag);
+        status = append_state_event(c, move, present.attempt, now, diag);
     if (status == GROOM_OK && store_job_state_is_end(move->to))
-        status = drop_checkpoint(store, move->job_id, garbage, diag);
+        status = drop_checkpoint(c, move->job_id, garbage, diag);
     return status;
 }
 
@@ -209,10 +210,11 @@ groom_status store_job_move(struct store *store, const struct store_job_move *mo
                             struct groom_diag *diag)
 {
     char dropped[STORE_HASH_SIZE] = "";
-    groom_status status = transaction_begin(store, diag);
+    struct connection *c;
+    groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    status = transaction_end(store, write_move(store, move, dropped, diag), diag);
+    status = transaction_end(c, write_move(c, move, dropped, diag), diag);
     if (status == GROOM_OK)
         memcpy(garbage, dropped, STORE_HASH_SIZE);
     return status;

@@ -11,15 +11,19 @@
 
 /* --- opening ------------------------------------------------------------------------- */
 
+const char *database_vfs = "unix-excl";
+
 /* FULL: a commit that was acknowledged survives the loss of power (NORMAL may lose the last ones in
- * WAL mode). Exclusive: this process alone, which also keeps the WAL index off shared memory. */
-static const char pragmas[] = "PRAGMA locking_mode = EXCLUSIVE;"
-                              "PRAGMA journal_mode = WAL;"
-                              "PRAGMA synchronous = FULL;"
-                              "PRAGMA foreign_keys = ON;"
-                              "PRAGMA trusted_schema = OFF;"
-                              "PRAGMA temp_store = MEMORY;"
-                              "PRAGMA journal_size_limit = 67108864;";
+ * WAL mode). */
+static const char writer_pragmas[] = "PRAGMA journal_mode = WAL;"
+                                     "PRAGMA synchronous = FULL;"
+                                     "PRAGMA foreign_keys = ON;"
+                                     "PRAGMA trusted_schema = OFF;"
+                                     "PRAGMA temp_store = MEMORY;"
+                                     "PRAGMA journal_size_limit = 67108864;";
+static const char reader_pragmas[] = "PRAGMA query_only = ON;"
+                                     "PRAGMA trusted_schema = OFF;"
+                                     "PRAGMA temp_store = MEMORY;";
 
 /* quick_check gives one row "ok", or a row for each thing that is wrong. */
 static groom_status check(sqlite3 *db, const char *path, struct groom_diag *diag)
@@ -41,18 +45,39 @@ static groom_status check(sqlite3 *db, const char *path, struct groom_diag *diag
     return status;
 }
 
+static groom_status open_connection(struct store *store, const char *path, int flags, const char *pragmas,
+                                    struct connection *c, struct groom_diag *diag)
+{
+    c->store = store;
+    int code = sqlite3_open_v2(path, &c->db, flags | SQLITE_OPEN_NOMUTEX, database_vfs);
+    if (code != SQLITE_OK)
+        return database_fail(c->db, code, diag);
+    sqlite3_extended_result_codes(c->db, 1);
+    sqlite3_busy_timeout(c->db, 2000);
+    return database_execute(c->db, pragmas, diag);
+}
+
+static groom_status open_readers(struct store *store, const char *path, struct groom_diag *diag)
+{
+    for (size_t i = 0; i < DATABASE_READERS; i++) {
+        struct connection *c = &store->readers[i];
+        groom_status status = open_connection(store, path, SQLITE_OPEN_READONLY, reader_pragmas, c, diag);
+        if (status != GROOM_OK)
+            return status;
+        c->next = store->free;
+        store->free = c;
+    }
+    return GROOM_OK;
+}
+
 static groom_status open_database(struct store *store, const char *path, struct groom_diag *diag)
 {
-    int code = sqlite3_open_v2(path, &store->db,
-                               SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL);
-    if (code != SQLITE_OK)
-        return database_fail(store->db, code, diag);
-    sqlite3_extended_result_codes(store->db, 1);
-    sqlite3_busy_timeout(store->db, 2000);
-    groom_status status;
-    if ((status = database_execute(store->db, pragmas, diag)) == GROOM_OK &&
-        (status = check(store->db, path, diag)) == GROOM_OK)
-        status = schema_migrate(store->db, schema_steps, schema_version, diag);
+    sqlite3 *db;
+    groom_status status = open_connection(store, path, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE,
+                                          writer_pragmas, &store->writer, diag);
+    if (status == GROOM_OK && (db = store->writer.db) && (status = check(db, path, diag)) == GROOM_OK &&
+        (status = schema_migrate(db, schema_steps, schema_version, diag)) == GROOM_OK)
+        status = open_readers(store, path, diag);
     return status;
 }
 
@@ -61,7 +86,9 @@ groom_status store_open(const char *path, struct store **store, struct groom_dia
     struct store *made = calloc(1, sizeof *made);
     if (!made)
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the store");
+    pthread_mutex_init(&made->writing, NULL);
     pthread_mutex_init(&made->lock, NULL);
+    pthread_cond_init(&made->freed, NULL);
     groom_status status = open_database(made, path, diag);
     if (status != GROOM_OK) {
         store_close(made);
@@ -71,24 +98,34 @@ groom_status store_open(const char *path, struct store **store, struct groom_dia
     return GROOM_OK;
 }
 
+static void close_connection(struct connection *c)
+{
+    for (size_t i = 0; i < c->n_cached; i++)
+        sqlite3_finalize(c->cache[i].statement);
+    sqlite3_close(c->db);
+}
+
+/* The writer last: whoever closes last checkpoints. */
 void store_close(struct store *store)
 {
     if (!store)
         return;
-    for (size_t i = 0; i < store->n_cached; i++)
-        sqlite3_finalize(store->cache[i].statement);
-    sqlite3_close(store->db);
+    for (size_t i = 0; i < DATABASE_READERS; i++)
+        close_connection(&store->readers[i]);
+    close_connection(&store->writer);
+    pthread_cond_destroy(&store->freed);
     pthread_mutex_destroy(&store->lock);
+    pthread_mutex_destroy(&store->writing);
     free(store);
 }
 
 groom_status store_ping(struct store *store, struct groom_diag *diag)
 {
-    store_lock(store);
-    struct query q = query_open(store, "SELECT count(*) FROM sqlite_schema", diag);
+    struct connection *c = read_begin(store);
+    struct query q = query_open(c, "SELECT count(*) FROM sqlite_schema", diag);
     query_row(&q);
     groom_status status = query_end(&q);
-    store_unlock(store);
+    read_end(c);
     return status;
 }
 

@@ -4,7 +4,7 @@
  * synchronous=FULL; nothing here names SQL, so that another backend fits behind it). A call that
  * returned GROOM_OK is on the disk. A call is one transaction: after a crash it has happened or not.
  *
- * threads   every function may be called from any thread; calls take turns
+ * threads   every function may be called from any thread; writes take turns, reads wait for no write
  * blocking  a write waits for the disk (a few ms): call from service threads, not from an event loop
  * strings   rows own what they point to; `*_finish` releases it, takes NULL and zeroed rows, and
  *           leaves a zeroed row. JSON is passed and kept as text.

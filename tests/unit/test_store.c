@@ -17,6 +17,7 @@
 #define HASH_C "cccccccccccccccccccccccccccccccccccccccccccccccccccccccccccccccc"
 
 static struct groom_diag diag;
+static struct store *job_store;
 
 static struct store *open_new(void)
 {
@@ -136,11 +137,25 @@ START_TEST(a_damaged_database_is_refused)
 }
 END_TEST
 
+/* The other is forked before: SQLite's locks are a process's own. */
 START_TEST(two_daemons_do_not_share_a_database)
 {
-    struct store *store = open_new(), *second;
-    ck_status(store_open(test_folder_path("groomd.db"), &second, &diag), GROOM_EIO);
-    ck_assert_ptr_nonnull(strstr(diag.detail, "another"));
+    struct store *store;
+    int go[2], how = 1;
+    char byte = 0;
+    test_folder_make();
+    const char *path = test_folder_path("groomd.db");
+    ck_assert_int_eq(pipe(go), 0);
+    pid_t child = fork();
+    if (child == 0) {
+        bool told = read(go[0], &byte, 1) == 1;
+        bool refused = told && store_open(path, &store, &diag) == GROOM_EIO;
+        _exit(refused && strstr(diag.detail, "another") ? 0 : 1);
+    }
+    ck_ok(store_open(path, &store, &diag));
+    ck_assert_int_eq((int)write(go[1], &byte, 1), 1);
+    ck_assert_int_eq(waitpid(child, &how, 0), child);
+    ck_assert_int_eq(how, 0);
     close_all(store);
 }
 END_TEST
@@ -768,6 +783,50 @@ START_TEST(what_was_acknowledged_survives_a_kill)
 }
 END_TEST
 
+/* --- readers and the writer ------------------------------------------------------------------------------ */
+
+static void *look_at_it(void *user)
+{
+    struct store_job job;
+    bool *seen = user;
+    *seen = store_job_get(job_store, "job_a", &job, NULL) == GROOM_OK && job.priority == 3;
+    if (*seen)
+        store_job_finish(&job);
+    return NULL;
+}
+
+/* A transaction is open, and stays so until the look has ended: were it to wait, this would not end. */
+START_TEST(a_look_waits_for_no_writer)
+{
+    struct store *store = job_store = open_new();
+    struct connection *c;
+    bool seen = false;
+    pthread_t looker;
+    make_job(store, "job_a", 3);
+    ck_ok(transaction_begin(store, &c, &diag));
+    ck_ok(database_execute(c->db, "UPDATE jobs SET priority = 4", &diag));
+    ck_assert_int_eq(pthread_create(&looker, NULL, look_at_it, &seen), 0);
+    pthread_join(looker, NULL);
+    ck_status(transaction_end(c, GROOM_ECANCELLED, &diag), GROOM_ECANCELLED);
+    ck_assert(seen);
+    close_all(store);
+}
+END_TEST
+
+/* What SQLite 3.40 demands: see database.h. */
+START_TEST(readers_cannot_write_or_checkpoint)
+{
+    struct store *store = open_new();
+    struct connection *c = read_begin(store);
+    ck_status(database_execute(c->db, "DELETE FROM jobs", &diag), GROOM_EIO);
+    read_end(c);
+    ck_assert_int_eq(sqlite3_db_readonly(c->db, "main"), 1);
+    ck_assert_int_ne(sqlite3_wal_checkpoint_v2(c->db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL), SQLITE_OK);
+    make_job(store, "job_a", 3);
+    close_all(store);
+}
+END_TEST
+
 /* --- a full disk -------------------------------------------------------------------------------------- */
 
 START_TEST(a_full_database_says_so_and_goes_on)
@@ -777,16 +836,16 @@ START_TEST(a_full_database_says_so_and_goes_on)
     struct store_array array = {.sha256 = HASH_B, .bytes = large, .n_bytes = 1 << 20};
     struct store_revision_new revision = first_revision;
     revision.arrays = &array;
-    ck_ok(database_execute(store->db, "PRAGMA max_page_count = 100", &diag));
+    ck_ok(database_execute(store->writer.db, "PRAGMA max_page_count = 100", &diag));
     ck_status(store_groom_create(store, &revision, &diag), GROOM_ENOSPC);
-    ck_ok(database_execute(store->db, "PRAGMA max_page_count = 100000", &diag));
+    ck_ok(database_execute(store->writer.db, "PRAGMA max_page_count = 100000", &diag));
     ck_ok(store_groom_create(store, &revision, &diag));
     free(large);
     close_all(store);
 }
 END_TEST
 
-TEST_SUITE("store", a_newer_schema_is_refused, what_is_not_a_database_is_refused, a_damaged_database_is_refused,
+TEST_SUITE("store", a_look_waits_for_no_writer, readers_cannot_write_or_checkpoint, a_newer_schema_is_refused, what_is_not_a_database_is_refused, a_damaged_database_is_refused,
            two_daemons_do_not_share_a_database, a_step_that_fails_leaves_the_version_before_it,
            ids_have_their_prefix_and_differ, times_are_rfc_3339,
            an_upload_comes_back_and_the_same_id_is_kept_once, the_id_of_an_upload_depends_on_bytes_and_options,
