@@ -42,6 +42,7 @@ PROTO_SOURCES  := $(call find_c,proto)
 WORKER_SOURCES := $(call find_c,server/worker)
 DAEMON_SOURCES := $(filter-out $(WORKER_SOURCES),$(call find_c,server))
 CLIENT_SOURCES := $(call find_c,client/groomctl)
+ENGINE         := build/web/engine.wasm
 MAINS          := server/groomd.c server/worker/main.c client/groomctl/main.c
 SUPPORT_SOURCES:= $(call find_c,tests/support)
 UNIT_TESTS     := $(patsubst tests/%.c,$(BUILD)/tests/%,$(call find_c,tests/unit tests/property))
@@ -67,7 +68,7 @@ setup:
 	@deploy/setup.sh
 
 lib: $(LIBGROOM) $(BUILD)/libgroom.so
-programs: lib $(PROGRAMS)
+programs: lib $(PROGRAMS) $(ENGINE)
 
 $(BUILD)/obj/%.o: %.c
 	@mkdir -p $(@D)
@@ -88,6 +89,23 @@ $(PROTO_A): $(call objects,$(PROTO_SOURCES))
 $(PARTS_A): $(call objects,$(filter-out $(MAINS),$(DAEMON_SOURCES) $(WORKER_SOURCES) $(CLIENT_SOURCES)))
 	@mkdir -p $(@D); rm -f $@
 	$(AR) rcs $@ $^
+
+# --- the web page's engine ----------------------------------------------------------
+
+# The model for WebAssembly, from the same sources. The same arithmetic in the
+# same order (no contraction): a strand's numbers are the same bits in the page and in the daemon.
+# Documents are taken apart by engine.mjs. Random123 asks for a processor that it knows; any will do.
+ENGINE_SOURCES = $(addprefix lib/base/,diag.c memory.c pool_serial.c random.c status.c) \
+                 $(filter-out lib/model/document_%,$(call find_c,lib/model)) client/web/engine/engine.c
+ENGINE_FLAGS   = --target=wasm32-wasi -std=c11 -D_GNU_SOURCE -O3 -msimd128 -ffp-contract=off -fno-math-errno \
+                 -fno-trapping-math -ffunction-sections $(WARNINGS) -Ilib/include -Ilib
+ENGINE_OBJECTS = $(patsubst %.c,build/web/obj/%.o,$(ENGINE_SOURCES))
+build/web/obj/lib/base/random.o: ENGINE_FLAGS += -D__riscv
+build/web/obj/%.o: %.c
+	@mkdir -p $(@D)
+	clang $(ENGINE_FLAGS) -MMD -MP -c $< -o $@
+$(ENGINE): $(ENGINE_OBJECTS)
+	clang --target=wasm32-wasi -mexec-model=reactor -O3 -Wl,--gc-sections,--strip-all -o $@ $^ -lm
 
 # Files that are embedded (proto/embed.h).
 $(BUILD)/obj/server/http/about.o: proto/openapi.json
@@ -183,4 +201,4 @@ clean:
 	rm -rf build
 
 .SECONDARY:
--include $(shell find $(BUILD)/obj $(FUZZ_BUILD)/obj -name '*.d' 2>/dev/null)
+-include $(shell find $(BUILD)/obj $(FUZZ_BUILD)/obj build/web/obj -name '*.d' 2>/dev/null)

@@ -84,7 +84,7 @@ check_c() {
     # shellcheck disable=SC2086
     cppcheck --quiet --std=c11 --language=c --error-exitcode=1 --inline-suppr -j2 \
         --enable=warning,portability --suppress=missingIncludeSystem --suppress=internalAstError \
-        -Ilib/include -Ilib -I. ${LINT_C:-lib proto server client/groomctl} || complain "cppcheck: see above"
+        -Ilib/include -Ilib -I. ${LINT_C:-lib proto server client/groomctl client/web} || complain "cppcheck: see above"
 }
 
 check_includes; check_guards; check_scripts; check_words; check_c

@@ -5,6 +5,10 @@
 
 static groom_status fill(struct groom_diag *diag, groom_status status, int64_t byte_offset,
                          const char *pointer, const char *format, va_list arguments)
+    __attribute__((format(printf, 5, 0)));
+
+static groom_status fill(struct groom_diag *diag, groom_status status, int64_t byte_offset,
+                         const char *pointer, const char *format, va_list arguments)
 {
     if (!diag)
         return status;

@@ -1,5 +1,7 @@
 /* A small pthread pool. Pieces are handed out by an atomic counter; OpenMP would
- * show false races under ThreadSanitizer, and C11 threads crash there. */
+ * show false races under ThreadSanitizer, and C11 threads crash there. pool_serial.c stands in
+ * where there are no threads. */
+#ifndef __wasm__
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -181,3 +183,4 @@ void parallel_for(const struct groom_context *context, uint32_t n_pieces, parall
     atomic_init(&loop.next_piece, 0);
     run_in_pool(pool, &loop);
 }
+#endif

@@ -18,7 +18,7 @@ const struct option_row options_table[] = {
      "The chain of operators, first to last. auto: scale, bend, curl, clump, frizz."},
     {"/interpolation_guides", OPTION_U32, AT(interpolation_guides), ALL(3), 1, 16,
      "Guides that each strand blends."},
-    {"/seed", OPTION_U64, AT(seed), ALL(1), 0, 9007199254740991.0,
+    {"/seed", OPTION_U64, AT(seed), ALL(1), 0, 999999999999999.0,
      "Seed of every random number of the fit and of the groom."},
     {"/quality", OPTION_QUALITY, AT(quality), {0, 1, 2}, 0, 2,
      "How much work to spend: sets the defaults of the stages."},

@@ -7,7 +7,7 @@
 #include "groom/document.h"
 #include "model/document_node.h"
 
-#define MAX_SEED 9007199254740991.0 /* beyond it a seed would not survive JSON's doubles */
+#define MAX_SEED 999999999999999.0 /* 15 digits: what every JSON library prints as it read it */
 #define MAX_OPERATORS 256
 
 struct reader {

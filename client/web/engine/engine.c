@@ -1,0 +1,129 @@
+/* The page's engine: libgroom's model, compiled to WebAssembly, behind functions that take and give
+ * numbers and addresses alone. engine.mjs is its only caller; a test holds its strands against the
+ * server's, bit for bit.
+ *
+ * A groom is made by its shape, filled through the addresses of its arrays, and edited in place.
+ * Functions that can fail return a groom_status; engine_message then says what to mend. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "groom/diag.h"
+#include "groom/groom.h"
+
+#pragma clang diagnostic ignored "-Wmissing-prototypes" /* nothing in C calls these */
+#define EXPORT(name) __attribute__((export_name(#name))) name
+
+static struct groom_diag last;
+
+const char *EXPORT(engine_message)(void) { return last.detail; }
+const char *EXPORT(engine_pointer)(void) { return last.pointer; }
+
+void *EXPORT(engine_allocate)(size_t n_bytes) { return aligned_alloc(64, (n_bytes + 63) / 64 * 64); }
+void EXPORT(engine_release)(void *memory) { free(memory); }
+
+/* --- a groom ----------------------------------------------------------------------- */
+
+struct groom *EXPORT(engine_groom)(uint32_t n_strands, uint32_t n_vertices, uint32_t n_guides,
+                                   uint32_t n_operator_guides, uint32_t n_instancing)
+{
+    struct groom_shape shape = {n_strands, n_vertices, n_guides, n_operator_guides, n_instancing};
+    struct groom *groom = NULL;
+    memset(&last, 0, sizeof last);
+    return groom_create(shape, NULL, &groom, &last) == GROOM_OK ? groom : NULL;
+}
+
+void EXPORT(engine_destroy)(struct groom *groom) { groom_destroy(groom); }
+
+/* The arrays in the order of engine.mjs. */
+void *EXPORT(engine_array)(struct groom *groom, uint32_t which)
+{
+    void *const arrays[] = {groom->roots,   groom->root_uv,          groom->guides,         groom->guide_uv,
+                            groom->instancing_guide, groom->instancing_weight, groom->operator_guide,
+                            groom->operator_guide_of};
+    return which < sizeof arrays / sizeof arrays[0] ? arrays[which] : NULL;
+}
+
+groom_status EXPORT(engine_validate)(const struct groom *groom)
+{
+    memset(&last, 0, sizeof last);
+    return groom_validate(groom, &last);
+}
+
+/* --- its chain ------------------------------------------------------------------------ */
+
+static uint64_t wide(uint32_t high, uint32_t low) { return (uint64_t)high << 32 | low; }
+
+groom_status EXPORT(engine_insert)(struct groom *groom, uint32_t index, uint32_t type, uint32_t seed_high,
+                                   uint32_t seed_low)
+{
+    memset(&last, 0, sizeof last);
+    return groom_insert_operator(groom, index, (groom_operator_type)type, wide(seed_high, seed_low), &last);
+}
+
+groom_status EXPORT(engine_remove)(struct groom *groom, uint32_t index)
+{
+    return groom_remove_operator(groom, index, &last);
+}
+
+groom_status EXPORT(engine_move)(struct groom *groom, uint32_t from, uint32_t to)
+{
+    return groom_move_operator(groom, from, to, &last);
+}
+
+/* As a document has them; the random numbers stay. */
+void EXPORT(engine_identify)(struct groom *groom, uint32_t index, uint32_t id, uint32_t seed_high, uint32_t seed_low,
+                             uint32_t enabled)
+{
+    struct groom_operator *op = &groom->operators[index];
+    op->id = id;
+    op->seed = wide(seed_high, seed_low);
+    op->enabled = enabled != 0;
+}
+
+float *EXPORT(engine_parameters)(struct groom *groom, uint32_t index) { return groom->operators[index].parameter; }
+
+float *EXPORT(engine_random)(struct groom *groom, uint32_t index, uint32_t which)
+{
+    return which < GROOM_OPERATOR_MAX_RANDOM ? groom->operators[index].random[which] : NULL;
+}
+
+void EXPORT(engine_draw)(struct groom *groom, uint32_t index, uint32_t seed_high, uint32_t seed_low)
+{
+    groom_draw_random(groom, &groom->operators[index], wide(seed_high, seed_low));
+}
+
+/* --- what operators there are: one table for sliders, documents and evaluation ------------- */
+
+const char *EXPORT(engine_type_name)(uint32_t type)
+{
+    return type < GROOM_OPERATOR_COUNT ? groom_operator_name((groom_operator_type)type) : NULL;
+}
+
+uint32_t EXPORT(engine_n_parameters)(uint32_t type)
+{
+    uint32_t n;
+    groom_operator_parameters((groom_operator_type)type, &n);
+    return n;
+}
+
+const struct groom_operator_parameter *EXPORT(engine_parameter)(uint32_t type, uint32_t index)
+{
+    uint32_t n;
+    return groom_operator_parameters((groom_operator_type)type, &n) + index;
+}
+
+uint32_t EXPORT(engine_n_random)(uint32_t type) { return groom_operator_random_arrays((groom_operator_type)type); }
+
+const char *EXPORT(engine_random_name)(uint32_t type, uint32_t which)
+{
+    uint32_t n;
+    return groom_operator_randoms((groom_operator_type)type, &n)[which].name;
+}
+
+/* --- strands ----------------------------------------------------------------------------- */
+
+groom_status EXPORT(engine_evaluate)(const struct groom *groom, uint32_t first, uint32_t count, float (*out)[3])
+{
+    memset(&last, 0, sizeof last);
+    return groom_evaluate(groom, first, count, out, NULL, &last);
+}

@@ -1,0 +1,140 @@
+/* The page's groom: a groom document (arrays inline) held by the WebAssembly engine, edited in place
+ * and evaluated to strands at the server's own numbers. Runs in a page, in a worker and in Node. */
+
+const ARRAYS = [
+    ['strands', 'roots'], ['strands', 'root_uv'], ['guides', 'points'], ['guides', 'root_uv'],
+    ['instancing', 'guide'], ['instancing', 'weight'], ['operator_guides', 'guide'], ['operator_guides', 'of_strand'],
+];
+
+function bytesOf(array) {
+    const text = atob(array.data);
+    const bytes = new Uint8Array(text.length);
+    for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
+    return bytes;
+}
+
+/* Seeds are whole numbers below 2^53 in documents, 64 bits in the engine. */
+const high = (seed) => Math.floor(seed / 4294967296) >>> 0;
+const low = (seed) => seed % 4294967296 >>> 0;
+
+export class Engine {
+    /* wasm: bytes, or a Response that is still arriving */
+    static async load(wasm) {
+        /* wasi-libc wants these for stdio, which the engine never uses */
+        const refuse = () => 8;
+        const imports = { wasi_snapshot_preview1: new Proxy({}, { get: () => refuse }) };
+        const { instance } = wasm instanceof Response ? await WebAssembly.instantiateStreaming(wasm, imports)
+                                                      : await WebAssembly.instantiate(wasm, imports);
+        instance.exports._initialize?.();
+        return new Engine(instance.exports);
+    }
+
+    constructor(exports) {
+        this.exports = exports;
+        this.types = this.#readTypes();
+    }
+
+    get memory() { return this.exports.memory.buffer; }
+
+    text(address) {
+        const bytes = new Uint8Array(this.memory, address);
+        return address ? new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0))) : null;
+    }
+
+    /* Operator types with their parameters: name, unit, range, help, as libgroom has them. */
+    #readTypes() {
+        const types = [];
+        for (let type = 0, name; (name = this.text(this.exports.engine_type_name(type))) !== null; type++) {
+            const parameters = [];
+            for (let i = 0; i < this.exports.engine_n_parameters(type); i++) parameters.push(this.#readParameter(type, i));
+            const random = [];
+            for (let i = 0; i < this.exports.engine_n_random(type); i++)
+                random.push(this.text(this.exports.engine_random_name(type, i)));
+            types.push({ type, name, parameters, random });
+        }
+        return types;
+    }
+
+    /* struct groom_operator_parameter: two addresses, four floats, one address */
+    #readParameter(type, index) {
+        const view = new DataView(this.memory, this.exports.engine_parameter(type, index), 28);
+        const float = (i) => view.getFloat32(8 + 4 * i, true);
+        return {
+            name: this.text(view.getUint32(0, true)), unit: this.text(view.getUint32(4, true)),
+            minimum: float(0), maximum: float(1), slider_maximum: float(2), initial: float(3),
+            help: this.text(view.getUint32(24, true)),
+        };
+    }
+
+    typeOf(name) {
+        const type = this.types.find((t) => t.name === name);
+        if (!type) throw new Error(`operator "${name}" is not known to the engine`);
+        return type;
+    }
+
+    check(status) {
+        if (status === 0) return;
+        const error = new Error(this.text(this.exports.engine_message()));
+        error.pointer = this.text(this.exports.engine_pointer());
+        throw error;
+    }
+
+    copyIn(bytes, address) { new Uint8Array(this.memory, address, bytes.length).set(bytes); }
+}
+
+export class Groom {
+    constructor(engine, document) {
+        this.engine = engine;
+        this.count = document.strands.count;
+        this.vertices = document.strands.vertices;
+        this.address = engine.exports.engine_groom(this.count, this.vertices, document.guides.count,
+            document.operator_guides.guide.shape[0], document.instancing.guide.shape[1]);
+        if (!this.address) throw new Error(engine.text(engine.exports.engine_message()));
+        ARRAYS.forEach(([part, name], which) =>
+            engine.copyIn(bytesOf(document[part][name]), engine.exports.engine_array(this.address, which)));
+        document.operators.forEach((operator, i) => this.insert(i, operator));
+        engine.check(engine.exports.engine_validate(this.address));
+    }
+
+    destroy() {
+        this.engine.exports.engine_release(this.points ?? 0);
+        this.engine.exports.engine_destroy(this.address);
+    }
+
+    /* An operator as a document has it; what it leaves out is supplied as the server does. */
+    insert(index, operator) {
+        const { engine, address } = this, { exports } = engine, type = engine.typeOf(operator.type);
+        const seed = operator.seed ?? 1;
+        engine.check(exports.engine_insert(address, index, type.type, high(seed), low(seed)));
+        if (operator.id !== undefined) {
+            exports.engine_identify(address, index, operator.id, high(seed), low(seed), operator.enabled === false ? 0 : 1);
+            exports.engine_draw(address, index, high(seed), low(seed));
+        }
+        type.random.forEach((name, which) => {
+            if (operator.random?.[name]) engine.copyIn(bytesOf(operator.random[name]), exports.engine_random(address, index, which));
+        });
+        for (const parameter of type.parameters)
+            if (operator[parameter.name] !== undefined) this.set(index, type, parameter.name, operator[parameter.name]);
+    }
+
+    set(index, type, name, value) {
+        const slot = type.parameters.findIndex((p) => p.name === name);
+        new Float32Array(this.engine.memory, this.engine.exports.engine_parameters(this.address, index), 4)[slot] = value;
+    }
+
+    remove(index) { this.engine.check(this.engine.exports.engine_remove(this.address, index)); }
+    move(from, to) { this.engine.check(this.engine.exports.engine_move(this.address, from, to)); }
+
+    /* Strands first..first+count-1 as one Float32Array [count * vertices * 3], valid until the next call. */
+    evaluate(first = 0, count = this.count) {
+        const { exports } = this.engine, n = count * this.vertices * 3;
+        if (!this.points || this.room < n) {
+            exports.engine_release(this.points ?? 0);
+            this.points = exports.engine_allocate(4 * n);
+            this.room = n;
+            if (!this.points) throw new Error(`no memory for ${count} strands`);
+        }
+        this.engine.check(exports.engine_evaluate(this.address, first, count, this.points));
+        return new Float32Array(this.engine.memory, this.points, n);
+    }
+}
