@@ -96,7 +96,7 @@ $(PARTS_A): $(call objects,$(filter-out $(MAINS),$(DAEMON_SOURCES) $(WORKER_SOUR
 # same order (no contraction): a strand's numbers are the same bits in the page and in the daemon.
 # Documents are taken apart by engine.mjs. Random123 asks for a processor that it knows; any will do.
 ENGINE_SOURCES = $(addprefix lib/base/,diag.c memory.c pool_serial.c random.c status.c) \
-                 $(filter-out lib/model/document_%,$(call find_c,lib/model)) client/web/engine/engine.c
+                 $(filter-out lib/model/document_%,$(call find_c,lib/model)) lib/strands/strands.c client/web/engine/engine.c
 ENGINE_FLAGS   = --target=wasm32-wasi -std=c11 -D_GNU_SOURCE -O3 -msimd128 -ffp-contract=off -fno-math-errno \
                  -fno-trapping-math -ffunction-sections $(WARNINGS) -Ilib/include -Ilib
 ENGINE_OBJECTS = $(patsubst %.c,build/web/obj/%.o,$(ENGINE_SOURCES))

@@ -299,6 +299,6 @@ void estimate_apply(const struct estimates *estimates, struct groom_operator *op
         set(op, 0, estimates->frizz_frequency);
         set(op, 1, estimates->frizz_amplitude);
         break;
-    case GROOM_OPERATOR_COUNT: break;
+    default: break; /* layers are not fitted */
     }
 }

@@ -110,7 +110,8 @@ static groom_status parse_operators(const cJSON *json, struct groom_fit_options 
         char pointer[MAX_PATH];
         groom_operator_type type;
         snprintf(pointer, sizeof pointer, "/operators/%u", n);
-        if (!cJSON_IsString(item) || groom_operator_parse(item->valuestring, &type, NULL) != GROOM_OK)
+        if (!cJSON_IsString(item) || groom_operator_parse(item->valuestring, &type, NULL) != GROOM_OK ||
+            groom_operator_is_layer(type))
             return groom_fail_field(diag, GROOM_EINVAL, pointer,
                                     "an operator is one of \"scale\", \"bend\", \"curl\", \"clump\", \"frizz\"");
         options->operators[n++] = type;

@@ -14,6 +14,9 @@ size_t model_random_count(const struct groom *groom, groom_operator_type type)
 groom_status model_operator_allocate(const struct groom *groom, struct groom_operator *op)
 {
     memset(op->random, 0, sizeof op->random);
+    op->layer = NULL;
+    if (groom_operator_is_layer(op->type))
+        return layer_create(groom->allocator, &op->layer);
     for (uint32_t a = 0; a < groom_operator_random_arrays(op->type); a++) {
         op->random[a] = memory_array(groom->allocator, model_random_count(groom, op->type), sizeof(float));
         if (!op->random[a]) {
@@ -30,6 +33,25 @@ void model_operator_finish(const struct groom *groom, struct groom_operator *op)
         memory_release(groom->allocator, op->random[a], model_random_count(groom, op->type), sizeof(float));
         op->random[a] = NULL;
     }
+    layer_destroy(op->layer, groom->n_strands, groom->allocator);
+    op->layer = NULL;
+}
+
+groom_status model_operator_copy(const struct groom *groom, const struct groom_operator *from, struct groom_operator *to)
+{
+    to->enabled = from->enabled;
+    to->seed = from->seed;
+    to->id = from->id;
+    memcpy(to->parameter, from->parameter, sizeof to->parameter);
+    return from->layer ? layer_copy(from->layer, groom->n_strands, groom->allocator, to->layer) : GROOM_OK;
+}
+
+uint32_t model_first_layer(const struct groom *groom)
+{
+    uint32_t i = 0;
+    while (i < groom->n_operators && !(groom->operators[i].enabled && groom_operator_is_layer(groom->operators[i].type)))
+        i++;
+    return i;
 }
 
 void groom_draw_random(struct groom *groom, struct groom_operator *op, uint64_t seed)
@@ -68,8 +90,10 @@ groom_status groom_insert_operator(struct groom *groom, uint32_t index, groom_op
                                    struct groom_diag *diag)
 {
     uint32_t n = groom->n_operators;
-    if ((unsigned)type >= GROOM_OPERATOR_COUNT)
+    if ((unsigned)type >= GROOM_OPERATOR_TYPES)
         return groom_fail(diag, GROOM_EINVAL, "there is no operator type %d", (int)type);
+    if (groom->n_operator_guides == 0 && groom_operator_needs_guides(type))
+        return groom_fail(diag, GROOM_EINVAL, MODEL_NEEDS_GUIDES, groom_operator_name(type));
     if (index > n)
         return groom_fail(diag, GROOM_EINVAL, "an operator cannot stand at %u in a chain of %u", index, n);
     struct groom_operator op = operator_initial(groom, type);

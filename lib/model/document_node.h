@@ -53,4 +53,24 @@ groom_status document_array_create(const void *elements, enum document_dtype dty
 /* Replace a reference by its bytes; a node that is inline already stays. */
 groom_status document_array_inline(cJSON *node, const struct groom_array_finder *finder, struct groom_diag *diag);
 
+/* --- layers (document_layer.c) -------------------------------------------------- */
+
+/* Whether a layer of this type has this member beside its parameters. */
+int document_layer_has(groom_operator_type type, const char *name);
+/* Fill in what a layer holds from its node, whose place is /operators/<index>. */
+groom_status document_layer_read(const cJSON *node, uint32_t index, const struct groom *groom,
+                                 const struct groom_array_finder *finder, struct groom_operator *op,
+                                 struct groom_diag *diag);
+/* Add it to a node. */
+groom_status document_layer_write(const struct groom *groom, const struct groom_operator *op,
+                                  const struct groom_array_keeper *keeper, cJSON *node);
+
+/* --- a base (document_base.c) ------------------------------------------------------ */
+
+/* The groom of a document that has a "base": strands alone, without its chain. */
+groom_status document_base_read(const cJSON *root, const struct groom_array_finder *finder,
+                                const struct groom_context *context, struct groom **groom, struct groom_diag *diag);
+/* Add "base" to the document. */
+groom_status document_base_write(const struct groom *groom, const struct groom_array_keeper *keeper, cJSON *root);
+
 #endif

@@ -6,6 +6,7 @@
 
 #include "groom/document.h"
 #include "model/document_node.h"
+#include "model/model.h"
 
 #define MAX_SEED 999999999999999.0 /* 15 digits: what every JSON library prints as it read it */
 #define MAX_OPERATORS 256
@@ -202,7 +203,7 @@ static groom_status refuse(struct place place, const char *field, const char *wh
     return groom_fail_field(place.reader->diag, GROOM_EINVAL, pointer, "%s", what);
 }
 
-static groom_status read_type(struct place place, const cJSON *node, groom_operator_type *type)
+static groom_status read_type(struct place place, const struct groom *groom, const cJSON *node, groom_operator_type *type)
 {
     const char *name = cJSON_GetStringValue(member(node, "type"));
     struct groom_diag unknown;
@@ -210,6 +211,11 @@ static groom_status read_type(struct place place, const cJSON *node, groom_opera
         return refuse(place, "type", "an operator is an object with a \"type\"");
     if (groom_operator_parse(name, type, &unknown) != GROOM_OK)
         return refuse(place, "type", unknown.detail);
+    if (groom->n_operator_guides == 0 && groom_operator_needs_guides(*type)) {
+        char what[256];
+        snprintf(what, sizeof what, MODEL_NEEDS_GUIDES, groom_operator_name(*type));
+        return refuse(place, "type", what);
+    }
     return GROOM_OK;
 }
 
@@ -224,7 +230,7 @@ static int is_member_of(groom_operator_type type, const char *name)
     for (uint32_t i = 0; i < n; i++)
         if (strcmp(name, parameters[i].name) == 0)
             return 1;
-    return 0;
+    return document_layer_has(type, name);
 }
 
 /* A misspelt parameter must not pass as the default. */
@@ -311,7 +317,7 @@ static groom_status read_operator(struct place place, const cJSON *node, struct 
     groom_operator_type type;
     uint64_t seed = 1, id = UINT32_MAX;
     groom_status status;
-    if ((status = read_type(place, node, &type)) != GROOM_OK ||
+    if ((status = read_type(place, groom, node, &type)) != GROOM_OK ||
         (status = refuse_unknown(place, node, type)) != GROOM_OK ||
         (status = read_whole_number(place, node, "seed", MAX_SEED, &seed)) != GROOM_OK ||
         (status = read_whole_number(place, node, "id", UINT32_MAX - MAX_OPERATORS, &id)) != GROOM_OK ||
@@ -324,6 +330,8 @@ static groom_status read_operator(struct place place, const cJSON *node, struct 
     if ((status = read_enabled(place, node, op)) != GROOM_OK ||
         (status = read_parameters(place, node, op)) != GROOM_OK)
         return status;
+    if (op->layer)
+        return document_layer_read(node, place.index, groom, reader->finder, op, reader->diag);
     if (random && !cJSON_IsNull(random))
         return read_random(place, groom, random, op);
     groom_draw_random(groom, op, seed);
@@ -375,16 +383,30 @@ static groom_status read_operators(struct reader *reader, struct groom *groom)
 
 /* --- the whole ----------------------------------------------------------------------- */
 
-static groom_status read_groom(struct reader *reader, const struct groom_context *context, struct groom **out)
+/* Where the strands come from: guides, or a base. */
+static groom_status read_source(struct reader *reader, const struct groom_context *context, struct groom **groom)
 {
     struct groom_shape shape;
+    groom_status status;
+    if (member(reader->root, "base")) {
+        if ((status = document_base_read(reader->root, reader->finder, context, groom, reader->diag)) != GROOM_OK)
+            return status;
+        shape = model_shape(*groom);
+        return check_counts(reader, shape);
+    }
+    if ((status = check_arrays(reader)) != GROOM_OK || (status = check_shapes(reader, &shape)) != GROOM_OK ||
+        (status = groom_create(shape, context, groom, reader->diag)) != GROOM_OK)
+        return status;
+    return copy_arrays(reader, *groom);
+}
+
+static groom_status read_groom(struct reader *reader, const struct groom_context *context, struct groom **out)
+{
     struct groom *groom = NULL;
     groom_status status;
-    if ((status = read_format(reader)) != GROOM_OK || (status = check_arrays(reader)) != GROOM_OK ||
-        (status = check_shapes(reader, &shape)) != GROOM_OK ||
-        (status = groom_create(shape, context, &groom, reader->diag)) != GROOM_OK ||
-        (status = copy_arrays(reader, groom)) != GROOM_OK || (status = read_name(reader, groom)) != GROOM_OK ||
-        (status = read_scalp(reader, groom)) != GROOM_OK || (status = read_operators(reader, groom)) != GROOM_OK ||
+    if ((status = read_format(reader)) != GROOM_OK || (status = read_source(reader, context, &groom)) != GROOM_OK ||
+        (status = read_name(reader, groom)) != GROOM_OK || (status = read_scalp(reader, groom)) != GROOM_OK ||
+        (status = read_operators(reader, groom)) != GROOM_OK ||
         (status = groom_validate(groom, reader->diag)) != GROOM_OK)
         goto out;
     *out = groom;

@@ -130,6 +130,8 @@ static void write_operator(struct writer *writer, const struct groom *groom, con
     for (uint32_t i = 0; i < n; i++)
         add_float(writer, node, parameters[i].name, op->parameter[i]);
     write_random(writer, groom, op, node);
+    if (op->layer && writer->status == GROOM_OK)
+        note(writer, document_layer_write(groom, op, writer->keeper, node));
 }
 
 static void write_operators(struct writer *writer, const struct groom *groom)
@@ -143,7 +145,7 @@ static void write_operators(struct writer *writer, const struct groom *groom)
 static int is_model_member(const char *name)
 {
     static const char *const members[] = {"format",     "unit",            "name",     "strands", "guides",
-                                          "instancing", "operator_guides", "operators"};
+                                          "instancing", "operator_guides", "operators", "base"};
     for (size_t i = 0; i < sizeof members / sizeof members[0]; i++)
         if (strcmp(name, members[i]) == 0)
             return 1;
@@ -182,8 +184,12 @@ groom_status groom_document_write(const struct groom *groom, const char *around,
     need(&writer, cJSON_AddStringToObject(writer.root, "name", groom->name));
     keep_other_members(&writer, others);
     write_strands(&writer, groom);
-    write_guides(&writer, groom);
-    write_assignments(&writer, groom);
+    if (groom->base && writer.status == GROOM_OK) {
+        note(&writer, document_base_write(groom, keeper, writer.root));
+    } else {
+        write_guides(&writer, groom);
+        write_assignments(&writer, groom);
+    }
     write_operators(&writer, groom);
     if ((status = writer.status) != GROOM_OK) {
         groom_fail(diag, status, "the groom document could not be written: %s", groom_status_message(status));

@@ -5,6 +5,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "model/model.h"
 #include "model/plan.h"
 
 #define SMALLEST_PIECE 64 /* strands */
@@ -15,50 +16,71 @@ struct evaluation {
     struct plan plan;
     struct workspace *workspace; /* [threads] */
     uint32_t first, count, piece_size;
-    uint32_t *order; /* [count] strands, in each piece those of one operator guide together */
-    uint32_t *next;  /* [threads][n_gop] for sorting */
+    size_t first_vertex;
+    int uneven;      /* strands have different numbers of vertices */
+    uint32_t n_keys;
+    uint32_t *order; /* [count] strands, in each piece those of one key together */
+    uint32_t *next;  /* [threads][n_keys] for sorting */
     float (*out)[3];
 };
 
-static void store_block(const struct evaluation *job, const struct block *block, const lanes *x)
+static void store_block(const struct evaluation *job, const struct block *block, uint32_t m, const lanes *x)
 {
     const float *root[LANES];
     float *row[LANES];
-    uint32_t m = job->plan.groom->n_vertices;
     plan_roots(&job->plan, block, root);
     for (uint32_t l = 0; l < block->n; l++)
-        row[l] = job->out[(size_t)(block->strand[l] - job->first) * m];
+        row[l] = job->out[groom_first_vertex(job->plan.groom, block->strand[l]) - job->first_vertex];
     block_to_rows(x, root, 3 * m, row, block->n);
 }
 
 static void evaluate_block(const struct evaluation *job, const struct block *block, struct workspace *w)
 {
-    lanes *x = w->state, *y = w->state + 3 * (size_t)w->m;
+    lanes *x = w->state, *y = w->state + 3 * (size_t)job->plan.groom->n_vertices;
     plan_load(&job->plan, block, w);
     for (uint32_t a = 0; a < job->plan.n_active; a++) {
         plan_apply(&job->plan, block, w, a, x, y);
         lanes *swap = x;
         x = y, y = swap;
     }
-    store_block(job, block, x);
+    store_block(job, block, w->m, x);
+}
+
+/* Strands of one block must have as many vertices; and it is well that they share their operator guide. */
+static uint32_t key_of(const struct evaluation *job, uint32_t strand)
+{
+    const struct groom *groom = job->plan.groom;
+    if (job->uneven)
+        return groom->first[strand + 1] - groom->first[strand];
+    return groom->n_operator_guides ? groom->operator_guide_of[strand] : 0;
 }
 
 /* Counting sort of a piece's strands by operator guide: the lanes of a block then mostly share their
  * guides, which stay in the cache. It changes no bit, for no lane looks at another. */
 static void sort_piece(const struct evaluation *job, uint32_t begin, uint32_t end, uint32_t *next)
 {
-    uint32_t n = job->plan.groom->n_operator_guides, sum = 0;
-    const uint32_t *key = job->plan.groom->operator_guide_of + job->first;
+    uint32_t n = job->n_keys, sum = 0;
     memset(next, 0, n * sizeof *next);
     for (uint32_t i = begin; i < end; i++)
-        next[key[i]]++;
+        next[key_of(job, job->first + i)]++;
     for (uint32_t o = 0; o < n; o++) {
         uint32_t size = next[o];
         next[o] = sum;
         sum += size;
     }
     for (uint32_t i = begin; i < end; i++)
-        job->order[begin + next[key[i]]++] = job->first + i;
+        job->order[begin + next[key_of(job, job->first + i)]++] = job->first + i;
+}
+
+/* How many of the strands from i on make one block. */
+static uint32_t block_size(const struct evaluation *job, uint32_t i, uint32_t end)
+{
+    uint32_t n = end - i < LANES ? end - i : LANES, same = 1;
+    if (!job->uneven)
+        return n;
+    while (same < n && key_of(job, job->order[i + same]) == key_of(job, job->order[i]))
+        same++;
+    return same;
 }
 
 static void evaluate_piece(void *user, uint32_t piece, uint32_t thread)
@@ -66,10 +88,14 @@ static void evaluate_piece(void *user, uint32_t piece, uint32_t thread)
     const struct evaluation *job = user;
     uint32_t begin = piece * job->piece_size;
     uint32_t end = job->count - begin < job->piece_size ? job->count : begin + job->piece_size;
-    sort_piece(job, begin, end, job->next + (size_t)thread * job->plan.groom->n_operator_guides);
-    for (uint32_t i = begin; i < end; i += LANES) {
-        struct block block = block_of(job->order + i, end - i < LANES ? end - i : LANES);
-        evaluate_block(job, &block, &job->workspace[thread]);
+    struct workspace *w = &job->workspace[thread];
+    sort_piece(job, begin, end, job->next + (size_t)thread * job->n_keys);
+    for (uint32_t i = begin, n; i < end; i += n) {
+        n = block_size(job, i, end);
+        struct block block = block_of(job->order + i, n);
+        if (job->uneven)
+            w->m = key_of(job, job->order[i]);
+        evaluate_block(job, &block, w);
     }
 }
 
@@ -86,7 +112,7 @@ static groom_status evaluation_allocate(struct evaluation *job, uint32_t n_threa
     const struct groom *groom = job->plan.groom;
     groom_status status = GROOM_OK;
     job->order = memory_array(allocator, job->count, sizeof *job->order);
-    job->next = memory_array(allocator, (size_t)n_threads * groom->n_operator_guides, sizeof *job->next);
+    job->next = memory_array(allocator, (size_t)n_threads * job->n_keys, sizeof *job->next);
     job->workspace = memory_array_zero(allocator, n_threads, sizeof *job->workspace);
     if (!job->order || !job->next || !job->workspace)
         return GROOM_ENOMEM;
@@ -100,10 +126,29 @@ static void evaluation_release(struct evaluation *job, uint32_t n_threads, const
     for (uint32_t t = 0; job->workspace && t < n_threads; t++)
         workspace_finish(&job->workspace[t], allocator);
     memory_release(allocator, job->workspace, n_threads, sizeof *job->workspace);
-    if (job->next)
-        memory_release(allocator, job->next, (size_t)n_threads * job->plan.groom->n_operator_guides, sizeof *job->next);
+        memory_release(allocator, job->next, (size_t)n_threads * job->n_keys, sizeof *job->next);
     memory_release(allocator, job->order, job->count, sizeof *job->order);
     plan_finish(&job->plan);
+}
+
+static int is_uneven(const struct groom *groom)
+{
+    for (uint32_t i = 0; groom->base && i < groom->n_strands; i++)
+        if (groom->first[i + 1] - groom->first[i] != groom->n_vertices)
+            return 1;
+    return 0;
+}
+
+static groom_status check_range(const struct groom *groom, uint32_t first, uint32_t count, struct groom_diag *diag)
+{
+    uint32_t layer = model_first_layer(groom);
+    if (first > groom->n_strands || count > groom->n_strands - first)
+        return groom_fail(diag, GROOM_EINVAL, "strands %u to %llu are asked for; there are %u", first,
+                          (unsigned long long)first + count, groom->n_strands);
+    if (layer < groom->n_operators)
+        return groom_fail(diag, GROOM_EINVAL, "operator %u is a layer: the chain must be evaluated with groom_layers_evaluate",
+                          layer);
+    return GROOM_OK;
 }
 
 groom_status evaluate_with(enum kernel_variant variant, const struct groom *groom, uint32_t first, uint32_t count,
@@ -112,10 +157,19 @@ groom_status evaluate_with(enum kernel_variant variant, const struct groom *groo
     const struct groom_allocator *allocator = memory_allocator(context);
     uint32_t n_threads = parallel_threads(context);
     struct evaluation job = {.first = first, .count = count, .piece_size = piece_size(count), .out = out};
-    if (first > groom->n_strands || count > groom->n_strands - first)
-        return groom_fail(diag, GROOM_EINVAL, "strands %u to %llu are asked for; there are %u", first,
-                          (unsigned long long)first + count, groom->n_strands);
-    groom_status status = plan_init(&job.plan, groom, NULL, first, count, variant, context);
+    groom_status status = check_range(groom, first, count, diag);
+    if (status != GROOM_OK)
+        return status;
+    job.first_vertex = groom_first_vertex(groom, first);
+    job.uneven = is_uneven(groom);
+    job.n_keys = job.uneven ? groom->n_vertices + 1 : groom->n_operator_guides ? groom->n_operator_guides : 1;
+    status = plan_init(&job.plan, groom, NULL, first, count, variant, context);
+    if (status == GROOM_OK && groom->base && job.plan.n_active == 0) { /* as they are: root and back would round */
+        memcpy(out, groom->base + job.first_vertex,
+               (groom_first_vertex(groom, first + count) - job.first_vertex) * sizeof *out);
+        plan_finish(&job.plan);
+        return GROOM_OK;
+    }
     if (status == GROOM_OK)
         status = evaluation_allocate(&job, n_threads, allocator);
     if (status == GROOM_OK)

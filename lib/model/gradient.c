@@ -11,6 +11,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "model/evaluate.h"
+#include "model/model.h"
 #include "model/plan.h"
 #include "model/scatter.h"
 
@@ -286,6 +287,8 @@ static void run_waves(struct reverse *r, const uint32_t *strand, uint32_t count,
 static groom_status check_visit(const struct groom *groom, const uint32_t *strand, uint32_t count,
                                 const struct groom_gradient *gradient, struct groom_diag *diag)
 {
+    if (groom->base || model_first_layer(groom) < groom->n_operators)
+        return groom_fail(diag, GROOM_EINVAL, "a groom made of strands has no gradient, and neither has a layer");
     if (!gradient_matches(gradient, groom))
         return groom_fail(diag, GROOM_EINVAL, "the gradient was made for another groom or chain; create it anew");
     if (!strand && count != groom->n_strands)

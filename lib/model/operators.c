@@ -28,6 +28,25 @@ static const struct groom_operator_parameter frizz_parameters[] = {
     {"frequency", "1/m", 0.0f, 5000.0f, 500.0f, 50.0f, "Waves of the noise in a metre of hair."},
     {"amplitude", "m", 0.0f, 0.2f, 0.03f, 0.004f, "Size of the noise; strands move by about a tenth of it."},
 };
+static const struct groom_operator_parameter ruffle_parameters[] = {
+    {"rho", "", 0.0f, 1.0f, 0.3f, 1.0f, "How much of the hair is exchanged between strands: the chance of each piece."},
+    {"blend", "", 0.0f, 1.0f, 1.0f, 1.0f, "How far each piece goes from its own shape to the other strand's."},
+    {"match_elements", "count", 0.0f, 4096.0f, 4.0f, 20.0f, "Pieces next to the root that stay as they are."},
+};
+static const struct groom_operator_parameter sculpt_parameters[] = {
+    {"stiffness", "cm^4", 0.0f, 1e6f, 10.0f, 100.0f,
+     "How much strands keep their curls: 0 gives way to the anchors wherever these pull."},
+};
+static const struct groom_operator_parameter interpolate_parameters[] = {
+    {"t", "", 0.0f, 1.0f, 0.5f, 1.0f, "0 is this groom, 1 the other."},
+};
+static const struct groom_operator_parameter curl_scale_parameters[] = {
+    {"radius", "", 0.01f, 100.0f, 1.0f, 3.0f, "Factor of the radius of each curl."},
+    {"step", "", 0.01f, 100.0f, 1.0f, 3.0f, "Factor of the rise of each turn."},
+    {"ramp_root", "", 0.0f, 1.0f, 1.0f, 1.0f, "How much of the change there is at the root."},
+    {"ramp_tip", "", 0.0f, 1.0f, 1.0f, 1.0f, "How much of the change there is at the tip."},
+    {"largest_radius", "m", 0.0f, 10.0f, 0.0f, 0.1f, "Bends wider than this are not curls and stay; 0: all are."},
+};
 
 static const struct groom_operator_random truncated_normal[] = {{"u", -1.0f, 1.0f}};
 static const struct groom_operator_random uniform[] = {{"u", 0.0f, 1.0f}};
@@ -36,29 +55,37 @@ static const struct groom_operator_random curl_random[] = {{"u1", -1.0f, 1.0f}, 
 struct operator_entry {
     const char *name;
     uint32_t n_random;
-    int per_guide;
+    int per_guide, needs_guides;
     const struct groom_operator_parameter *parameters;
     uint32_t n_parameters;
     const struct groom_operator_random *randoms;
 };
 
-#define ENTRY(constant, slug, n_random, per_guide) {slug, n_random, per_guide, constant##_TABLES}
+#define ENTRY(constant, slug, n_random, per_guide, needs_guides) {slug, n_random, per_guide, needs_guides, constant##_TABLES}
 #define GROOM_OPERATOR_SCALE_TABLES scale_parameters, COUNT(scale_parameters), truncated_normal
 #define GROOM_OPERATOR_BEND_TABLES bend_parameters, COUNT(bend_parameters), truncated_normal
 #define GROOM_OPERATOR_CURL_TABLES curl_parameters, COUNT(curl_parameters), curl_random
 #define GROOM_OPERATOR_CLUMP_TABLES clump_parameters, COUNT(clump_parameters), NULL
 #define GROOM_OPERATOR_FRIZZ_TABLES frizz_parameters, COUNT(frizz_parameters), uniform
+#define GROOM_OPERATOR_RUFFLE_TABLES ruffle_parameters, COUNT(ruffle_parameters), NULL
+#define GROOM_OPERATOR_SCULPT_TABLES sculpt_parameters, COUNT(sculpt_parameters), NULL
+#define GROOM_OPERATOR_INTERPOLATE_TABLES interpolate_parameters, COUNT(interpolate_parameters), NULL
+#define GROOM_OPERATOR_CURL_SCALE_TABLES curl_scale_parameters, COUNT(curl_scale_parameters), NULL
 
-static const struct operator_entry table[GROOM_OPERATOR_COUNT] = {
-#define OPERATOR_ROW(constant, slug, n_random, per_guide) [constant] = ENTRY(constant, slug, n_random, per_guide),
+static const struct operator_entry table[GROOM_OPERATOR_TYPES] = {
+#define OPERATOR_ROW(constant, slug, n_random, per_guide, needs_guides)                                              \
+    [constant] = ENTRY(constant, slug, n_random, per_guide, needs_guides),
     GROOM_OPERATOR_LIST(OPERATOR_ROW)
 #undef OPERATOR_ROW
+#define LAYER_ROW(constant, slug) [constant] = ENTRY(constant, slug, 0, 0, 0),
+    GROOM_LAYER_LIST(LAYER_ROW)
+#undef LAYER_ROW
 };
 
 static const struct operator_entry *entry_of(groom_operator_type type)
 {
     static const struct operator_entry nothing = {.name = "unknown"};
-    return (unsigned)type < GROOM_OPERATOR_COUNT ? &table[type] : &nothing;
+    return (unsigned)type < GROOM_OPERATOR_TYPES ? &table[type] : &nothing;
 }
 
 const char *groom_operator_name(groom_operator_type type) { return entry_of(type)->name; }
@@ -79,15 +106,24 @@ uint32_t groom_operator_random_arrays(groom_operator_type type) { return entry_o
 
 int groom_operator_random_per_guide(groom_operator_type type) { return entry_of(type)->per_guide; }
 
+int groom_operator_needs_guides(groom_operator_type type) { return entry_of(type)->needs_guides; }
+
+int groom_operator_is_layer(groom_operator_type type)
+{
+    return (unsigned)type >= GROOM_OPERATOR_COUNT && (unsigned)type < GROOM_OPERATOR_TYPES;
+}
+
 groom_status groom_operator_parse(const char *name, groom_operator_type *type, struct groom_diag *diag)
 {
-    for (unsigned i = 0; i < GROOM_OPERATOR_COUNT; i++)
+    for (unsigned i = 0; i < GROOM_OPERATOR_TYPES; i++)
         if (strcmp(name, table[i].name) == 0) {
             *type = (groom_operator_type)i;
             return GROOM_OK;
         }
-#define OPERATOR_WORD(constant, slug, n_random, per_guide) " " slug
+#define OPERATOR_WORD(constant, slug, n_random, per_guide, needs_guides) " " slug
+#define LAYER_WORD(constant, slug) " " slug
     return groom_fail(diag, GROOM_EINVAL, "there is no operator \"%.40s\"; choose one of:%s", name,
-                      GROOM_OPERATOR_LIST(OPERATOR_WORD));
+                      GROOM_OPERATOR_LIST(OPERATOR_WORD) GROOM_LAYER_LIST(LAYER_WORD));
 #undef OPERATOR_WORD
+#undef LAYER_WORD
 }

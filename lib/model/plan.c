@@ -5,6 +5,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "model/frames.h"
+#include "model/model.h"
 
 #define GUIDES_A_PIECE 32
 
@@ -126,7 +127,7 @@ void workspace_finish(struct workspace *w, const struct groom_allocator *allocat
 void plan_roots(const struct plan *plan, const struct block *block, const float *root[LANES])
 {
     for (uint32_t l = 0; l < LANES; l++)
-        root[l] = plan->groom->roots[block->strand[l]];
+        root[l] = model_root(plan->groom, block->strand[l]);
 }
 
 /* Rows of a table of the operator guides, side by side. */
@@ -151,6 +152,18 @@ static void load_guides(const struct plan *plan, const struct block *block, lane
     block_from_rows(row, root, 3 * groom->n_vertices, x);
 }
 
+/* A strand relative to its root, as it comes into the chain. */
+static void load_strand(const struct groom *groom, uint32_t strand, uint32_t m, float *row)
+{
+    if (!groom->base) {
+        block_instance(groom, strand, row);
+        return;
+    }
+    const float *root = model_root(groom, strand), *from = root;
+    for (uint32_t i = 0; i < 3 * m; i++)
+        row[i] = from[i] - root[i % 3];
+}
+
 void plan_load(const struct plan *plan, const struct block *block, struct workspace *w)
 {
     const float *row[LANES];
@@ -158,7 +171,7 @@ void plan_load(const struct plan *plan, const struct block *block, struct worksp
         uint32_t own = l < block->n ? l : block->n - 1;
         row[l] = w->rows + (size_t)own * 3 * w->m;
         if (own == l)
-            block_instance(plan->groom, block->strand[l], w->rows + (size_t)l * 3 * w->m);
+            load_strand(plan->groom, block->strand[l], w->m, w->rows + (size_t)l * 3 * w->m);
     }
     block_from_rows(row, NULL, 3 * w->m, w->state);
     if (plan->clumps)

@@ -3,6 +3,7 @@
 
 #include "groom/groom.h"
 #include "groom/random.h"
+#include "model/model.h"
 
 /* "fair" in a stream of its own, so that no operator's numbers are used. */
 static const struct groom_random_key fair_key = {0x66616972, 0xffffffff};
@@ -31,7 +32,8 @@ static void copy_strands(const struct groom *from, const uint32_t *strand, uint3
     copy_rows(to->root_uv, from->root_uv, sizeof *from->root_uv, strand, count);
     copy_rows(to->instancing_guide, from->instancing_guide, k * sizeof *from->instancing_guide, strand, count);
     copy_rows(to->instancing_weight, from->instancing_weight, k * sizeof *from->instancing_weight, strand, count);
-    copy_rows(to->operator_guide_of, from->operator_guide_of, sizeof *from->operator_guide_of, strand, count);
+    if (from->n_operator_guides)
+        copy_rows(to->operator_guide_of, from->operator_guide_of, sizeof *from->operator_guide_of, strand, count);
 }
 
 static void copy_guides(const struct groom *from, struct groom *to)
@@ -53,7 +55,7 @@ static groom_status copy_operator(const struct groom *from, uint32_t index, cons
         return status;
     struct groom_operator *op = &to->operators[index];
     op->id = source->id;
-    op->enabled = source->enabled;
+    op->enabled = source->enabled; /* a layer is not, and stays empty: it names strands that are not here */
     memcpy(op->parameter, source->parameter, sizeof op->parameter);
     for (uint32_t i = 0; i < groom_operator_random_arrays(source->type); i++)
         if (groom_operator_random_per_guide(source->type))
@@ -63,17 +65,66 @@ static groom_status copy_operator(const struct groom *from, uint32_t index, cons
     return GROOM_OK;
 }
 
-groom_status groom_select(const struct groom *groom, const uint32_t *strand, uint32_t count,
-                          const struct groom_context *context, struct groom **selected, struct groom_diag *diag)
+/* The base of these strands alone. */
+static groom_status gather_base(const struct groom *from, const uint32_t *strand, uint32_t count,
+                                const struct groom_context *context, struct groom_strands **out, struct groom_diag *diag)
 {
-    struct groom_shape shape = {count, groom->n_vertices, groom->n_guides, groom->n_operator_guides,
-                                groom->n_instancing};
-    struct groom *out = NULL;
+    uint64_t n_vertices = 0;
+    for (uint32_t i = 0; i < count; i++)
+        n_vertices += from->first[strand[i] + 1] - from->first[strand[i]];
+    groom_status status = groom_strands_create(count, n_vertices, context, out, diag);
+    for (uint32_t i = 0; status == GROOM_OK && i < count; i++) {
+        uint32_t at = from->first[strand[i]], n = from->first[strand[i] + 1] - at;
+        memcpy((*out)->points + (*out)->first[i], from->base + at, n * sizeof *from->base);
+        (*out)->first[i + 1] = (*out)->first[i] + n;
+    }
+    return status;
+}
+
+static groom_status create_selected(const struct groom *from, const uint32_t *strand, uint32_t count,
+                                    const struct groom_context *context, struct groom **out, struct groom_diag *diag)
+{
+    struct groom_shape shape = {count, from->n_vertices, from->n_guides, from->n_operator_guides, from->n_instancing};
+    struct groom_strands *base = NULL;
+    groom_status status = GROOM_OK;
+    if (from->base && count > 0)
+        status = gather_base(from, strand, count, context, &base, diag);
+    if (status == GROOM_OK)
+        status = from->n_guides || !base ? groom_create(shape, context, out, diag)
+                                         : groom_create_of_strands(base, context, out, diag);
+    if (status == GROOM_OK && base && from->n_guides) {
+        if ((status = model_give_base(*out, base->n_vertices)) != GROOM_OK) {
+            groom_destroy(*out);
+            groom_fail(diag, status, "no memory for %u strands", count);
+        } else {
+            memcpy((*out)->first, base->first, ((size_t)count + 1) * sizeof *base->first);
+            memcpy((*out)->base, base->points, (size_t)base->n_vertices * sizeof *base->points);
+        }
+    }
+    groom_strands_destroy(base);
+    return status;
+}
+
+static groom_status check_selection(const struct groom *groom, const uint32_t *strand, uint32_t count,
+                                    struct groom_diag *diag)
+{
+    if (model_first_layer(groom) < groom->n_operators)
+        return groom_fail(diag, GROOM_EINVAL, "operator %u is a layer, which looks at all strands: select behind it",
+                          model_first_layer(groom));
     for (uint32_t i = 0; i < count; i++)
         if (strand[i] >= groom->n_strands)
             return groom_fail(diag, GROOM_EINVAL, "strand %u is not among the groom's %u", strand[i],
                               groom->n_strands);
-    groom_status status = groom_create(shape, context, &out, diag);
+    return GROOM_OK;
+}
+
+groom_status groom_select(const struct groom *groom, const uint32_t *strand, uint32_t count,
+                          const struct groom_context *context, struct groom **selected, struct groom_diag *diag)
+{
+    struct groom *out = NULL;
+    groom_status status = check_selection(groom, strand, count, diag);
+    if (status == GROOM_OK)
+        status = create_selected(groom, strand, count, context, &out, diag);
     if (status != GROOM_OK)
         return status;
     copy_strands(groom, strand, count, out);

@@ -1,6 +1,7 @@
 /* Whether a groom can be evaluated: everything that came from outside is looked at once, here. */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "groom/groom.h"
 #include "model/model.h"
@@ -43,19 +44,25 @@ static groom_status check_weights(const struct groom *groom, struct groom_diag *
     return GROOM_OK;
 }
 
-static groom_status check_parameters(const struct groom_operator *op, uint32_t index, struct groom_diag *diag)
+static groom_status refuse_parameter(const struct groom_operator_parameter *parameter, uint32_t index, float value,
+                                     struct groom_diag *diag)
 {
     char pointer[sizeof diag->pointer];
+    snprintf(pointer, sizeof pointer, "/operators/%u/%s", index, parameter->name);
+    return groom_fail_field(diag, GROOM_EINVAL, pointer, "%s is %.6g; it must be %.6g..%.6g %s", parameter->name,
+                            (double)value, (double)parameter->minimum, (double)parameter->maximum,
+                            strcmp(parameter->unit, "count") ? parameter->unit : "and a whole number");
+}
+
+static groom_status check_parameters(const struct groom_operator *op, uint32_t index, struct groom_diag *diag)
+{
     uint32_t n;
     const struct groom_operator_parameter *parameters = groom_operator_parameters(op->type, &n);
     for (uint32_t p = 0; p < n; p++) {
         float value = op->parameter[p];
-        if (value >= parameters[p].minimum && value <= parameters[p].maximum)
-            continue;
-        snprintf(pointer, sizeof pointer, "/operators/%u/%s", index, parameters[p].name);
-        return groom_fail_field(diag, GROOM_EINVAL, pointer, "%s is %.6g; it must be %.6g..%.6g %s",
-                                parameters[p].name, (double)value, (double)parameters[p].minimum,
-                                (double)parameters[p].maximum, parameters[p].unit);
+        int whole = strcmp(parameters[p].unit, "count") || value == floorf(value);
+        if (!(value >= parameters[p].minimum && value <= parameters[p].maximum) || !whole)
+            return refuse_parameter(&parameters[p], index, value, diag);
     }
     return GROOM_OK;
 }
@@ -83,14 +90,17 @@ static groom_status check_operators(const struct groom *groom, struct groom_diag
     groom_status status = GROOM_OK;
     char pointer[sizeof diag->pointer];
     for (uint32_t i = 0; i < groom->n_operators && status == GROOM_OK; i++) {
-        if ((unsigned)groom->operators[i].type >= GROOM_OPERATOR_COUNT) {
-            snprintf(pointer, sizeof pointer, "/operators/%u/type", i);
-            return groom_fail_field(diag, GROOM_EINVAL, pointer, "there is no operator type %d",
-                                    (int)groom->operators[i].type);
-        }
-        status = check_parameters(&groom->operators[i], i, diag);
+        const struct groom_operator *op = &groom->operators[i];
+        snprintf(pointer, sizeof pointer, "/operators/%u/type", i);
+        if ((unsigned)op->type >= GROOM_OPERATOR_TYPES)
+            return groom_fail_field(diag, GROOM_EINVAL, pointer, "there is no operator type %d", (int)op->type);
+        if (groom->n_operator_guides == 0 && groom_operator_needs_guides(op->type))
+            return groom_fail_field(diag, GROOM_EINVAL, pointer, MODEL_NEEDS_GUIDES, groom_operator_name(op->type));
+        status = check_parameters(op, i, diag);
         if (status == GROOM_OK)
             status = check_randoms(groom, i, diag);
+        if (status == GROOM_OK && op->layer)
+            status = layer_validate(groom, i, diag);
     }
     return status;
 }
@@ -102,15 +112,18 @@ groom_status groom_validate(const struct groom *g, struct groom_diag *diag)
 #define CHECK(call)                                                                                                  \
     if (status == GROOM_OK)                                                                                          \
     status = call
+    if (g->base)
+        CHECK(check_values(&g->base[0][0], 3 * (size_t)g->n_base, COORDINATE_LIMIT, "/base/points", diag));
     CHECK(check_values(&g->roots[0][0], 3 * n, COORDINATE_LIMIT, "/strands/roots", diag));
     CHECK(check_values(&g->root_uv[0][0], 2 * n, COORDINATE_LIMIT, "/strands/root_uv", diag));
     CHECK(check_values(&g->guides[0][0], 3 * (size_t)g->n_guides * g->n_vertices, COORDINATE_LIMIT, "/guides/points", diag));
     CHECK(check_values(&g->guide_uv[0][0], 2 * (size_t)g->n_guides, COORDINATE_LIMIT, "/guides/root_uv", diag));
     CHECK(check_indices(g->instancing_guide, n * k, g->n_guides, "/instancing/guide", diag));
     CHECK(check_values(g->instancing_weight, n * k, WEIGHT_LIMIT, "/instancing/weight", diag));
-    CHECK(check_weights(g, diag));
+    if (!g->base)
+        CHECK(check_weights(g, diag));
     CHECK(check_indices(g->operator_guide, g->n_operator_guides, g->n_guides, "/operator_guides/guide", diag));
-    CHECK(check_indices(g->operator_guide_of, n, g->n_operator_guides, "/operator_guides/of_strand", diag));
+    CHECK(check_indices(g->operator_guide_of, g->n_operator_guides ? n : 0, g->n_operator_guides, "/operator_guides/of_strand", diag));
     CHECK(check_operators(g, diag));
 #undef CHECK
     return status;

@@ -8,6 +8,23 @@
  *    "operators":[{"type":"curl","id":3,"enabled":true,"seed":1,"radius":0.006,…,
  *                  "random":{"u1":f32[nop],"u2":f32[nop]}},…]}
  *
+ * A groom made of uploaded strands has, in place of guides, instancing and operator_guides, its strands:
+ *    "base":{"strands":"str_…","vertices":u32[n],"points":f32[sum of vertices,3]}
+ * where "vertices" says how many each strand has; then strands.roots is what the base begins with.
+ *
+ * Layers stand in the chain like operators, with these members beside their parameters:
+ *    {"type":"ruffle","rho","blend","match_elements","elements","groups"}
+ *    {"type":"sculpt","stiffness","elements","anchors","contact","clusters":{"count","seed"},
+ *     "frames":[{"cluster","at","transform":[[…4],[…4],[…4]]},…]}
+ *    {"type":"interpolate","t","elements","target":{"groom","revision","vertices":u32[],"points":f32[,3]}}
+ *    {"type":"curl_scale","radius","step","ramp_root","ramp_tip","largest_radius","elements","groups","group",
+ *     "keep":"length"|"turns","hold_direction":bool}
+ * elements   a number for every strand, or "auto"
+ * groups     "all", "operator_guides", {"count","seed"} for k-means over root and tip, or a group for each
+ *            strand: u32[n], or a list
+ * anchors    {"strand":u32[a],"at":f32[a],"position":f32[a,3]}, or a list of {"strand","at","position":[x,y,z]};
+ *            contact, likewise, is what holds strands outside the head
+ *
  * and around these the members that the model does not own (id, revision, parent, source, fit, …),
  * which pass through untouched. Metres, y up, root first. Numbers are printed with nine digits and
  * arrays carry their bits, so that a document read back is the same groom, bit for bit.

@@ -5,7 +5,8 @@
  * groom document (groom/document.h) and all that evaluation needs.
  *
  * Everything is in metres, y up, root first. Every strand and every guide has
- * the same number of vertices m. */
+ * the same number of vertices m; where a groom is made of uploaded strands (its
+ * base), each keeps the vertices that it has. */
 #ifndef GROOM_GROOM_H
 #define GROOM_GROOM_H
 
@@ -14,6 +15,7 @@
 #include "groom/context.h"
 #include "groom/diag.h"
 #include "groom/scalp.h"
+#include "groom/strands.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -21,7 +23,10 @@ extern "C" {
 
 /* --- operators ------------------------------------------------------------ */
 
-/* Appendix A, in these conventions:
+/* Two kinds stand in one chain: operators proper, which look at one strand at a time, and layers, which
+ * look at whole dense strands in curvature space (groom/layers.h evaluates them).
+ *
+ * Operators follow Appendix A, in these conventions:
  * - lengths in metres throughout; operator guides are the undeformed guides, wherever in the chain;
  * - v_j is arc length over length: bend counts up to and with the segment, the others to the vertex;
  * - curl's phase is in turns; its frequencies are turns a metre of arc (the paper's 3 omega);
@@ -29,23 +34,39 @@ extern "C" {
  * - frizz: model/noise.h defines the noise, its hash and the offsets of the axes, once and for all;
  * - segments below 1e-12 m have no direction: a guide's is taken as +y there, derivatives as 0.
  * Which random numbers each draws, and for how many:
- * X(constant, name in documents, number of random arrays, drawn for each operator guide (1) or strand (0)) */
+ * X(constant, name in documents, number of random arrays, drawn for each operator guide (1) or strand (0),
+ *   whether it needs operator guides, which a groom made of uploaded strands has not) */
 #define GROOM_OPERATOR_LIST(X)                                                                     \
-    X(GROOM_OPERATOR_SCALE, "scale", 1, 0)                                                         \
-    X(GROOM_OPERATOR_BEND,  "bend",  1, 0)                                                         \
-    X(GROOM_OPERATOR_CURL,  "curl",  2, 1)                                                         \
-    X(GROOM_OPERATOR_CLUMP, "clump", 0, 0)                                                         \
-    X(GROOM_OPERATOR_FRIZZ, "frizz", 1, 0)
+    X(GROOM_OPERATOR_SCALE, "scale", 1, 0, 0)                                                      \
+    X(GROOM_OPERATOR_BEND,  "bend",  1, 0, 1)                                                      \
+    X(GROOM_OPERATOR_CURL,  "curl",  2, 1, 1)                                                      \
+    X(GROOM_OPERATOR_CLUMP, "clump", 0, 0, 1)                                                      \
+    X(GROOM_OPERATOR_FRIZZ, "frizz", 1, 0, 0)
+
+/* Shi et al. 2026: elements exchanged between strands (4.3.1), control points moved (5), a blend with other
+ * strands, curls made wider or narrower. X(constant, name in documents) */
+#define GROOM_LAYER_LIST(X)                                                                        \
+    X(GROOM_OPERATOR_RUFFLE,      "ruffle")                                                        \
+    X(GROOM_OPERATOR_SCULPT,      "sculpt")                                                        \
+    X(GROOM_OPERATOR_INTERPOLATE, "interpolate")                                                   \
+    X(GROOM_OPERATOR_CURL_SCALE,  "curl_scale")
 
 typedef enum groom_operator_type {
-#define GROOM_OPERATOR_ENUM(name, slug, n_random, per_guide) name,
+#define GROOM_OPERATOR_ENUM(name, slug, n_random, per_guide, needs_guides) name,
     GROOM_OPERATOR_LIST(GROOM_OPERATOR_ENUM)
 #undef GROOM_OPERATOR_ENUM
-    GROOM_OPERATOR_COUNT
+    GROOM_OPERATOR_COUNT, /* of operators proper; layers come after them */
+    GROOM_LAYER_BEFORE_FIRST = GROOM_OPERATOR_COUNT - 1,
+#define GROOM_LAYER_ENUM(name, slug) name,
+    GROOM_LAYER_LIST(GROOM_LAYER_ENUM)
+#undef GROOM_LAYER_ENUM
+    GROOM_OPERATOR_TYPES  /* both kinds */
 } groom_operator_type;
 
-#define GROOM_OPERATOR_MAX_PARAMETERS 4
+#define GROOM_OPERATOR_MAX_PARAMETERS 5
 #define GROOM_OPERATOR_MAX_RANDOM 2
+
+struct groom_layer;
 
 /* Parameters sit in one array, in the order of groom_operator_parameters(type):
  *   scale  random_scale (eta)
@@ -53,6 +74,10 @@ typedef enum groom_operator_type {
  *   curl   radius (rho, m), frequency (turns per m), random_frequency (turns per m), start (zeta)
  *   clump  profile (a)
  *   frizz  frequency (omega, per m), amplitude (alpha, m)
+ *   ruffle       rho, blend (0..1), match_elements (a count)
+ *   sculpt       stiffness (the paper's c, cm^4, at 45 elements a strand; the same pull at any other number)
+ *   interpolate  t (0: the groom's own strands, 1: the target's)
+ *   curl_scale   radius, step (factors), ramp_root, ramp_tip (0..1), largest_radius (m)
  * so that a fit, a gradient, a slider and a JSON object walk the same list. */
 struct groom_operator {
     groom_operator_type type;
@@ -61,11 +86,12 @@ struct groom_operator {
     uint32_t id;                /* stream of its random numbers: unique in the groom, stays when the chain is reordered */
     float parameter[GROOM_OPERATOR_MAX_PARAMETERS];
     float *random[GROOM_OPERATOR_MAX_RANDOM]; /* [n_strands] or [n_operator_guides]; NULL beyond the type's number */
+    struct groom_layer *layer;  /* what a layer has beside its parameters; NULL for an operator proper */
 };
 
 struct groom_operator_parameter {
     const char *name;       /* "radius" */
-    const char *unit;       /* "m", "rad", "1/m", "" */
+    const char *unit;       /* "m", "rad", "1/m", "cm^4", "count" (whole numbers alone), "" */
     float minimum, maximum; /* what a document may hold */
     float slider_maximum;   /* a sensible range in a user interface */
     float initial;          /* the documented starting value */
@@ -88,6 +114,64 @@ GROOM_MUST_CHECK groom_status groom_operator_parse(const char *name, groom_opera
 const struct groom_operator_random *groom_operator_randoms(groom_operator_type type, uint32_t *n);
 uint32_t groom_operator_random_arrays(groom_operator_type type);   /* their number alone */
 int groom_operator_random_per_guide(groom_operator_type type);     /* 1: one for each operator guide */
+int groom_operator_is_layer(groom_operator_type type);
+int groom_operator_needs_guides(groom_operator_type type);         /* 1: not for a groom made of strands */
+
+/* --- what a layer holds -------------------------------------------------------- */
+
+/* How strands are grouped. */
+typedef enum groom_grouping_kind {
+    GROOM_GROUPING_ALL = 0,         /* all strands are one group */
+    GROOM_GROUPING_GIVEN,           /* of_strand says */
+    GROOM_GROUPING_OPERATOR_GUIDES, /* those of one operator guide */
+    GROOM_GROUPING_CLUSTERS         /* k-means over root and tip of the strands that come into the layer */
+} groom_grouping_kind;
+
+struct groom_grouping {
+    groom_grouping_kind kind;
+    uint32_t count;      /* groups: GIVEN, CLUSTERS */
+    uint64_t seed;       /* CLUSTERS */
+    uint32_t *of_strand; /* GIVEN: [n_strands] below count; else NULL */
+};
+
+/* Control points and where they go. */
+struct groom_layer_anchors {
+    uint32_t n;
+    uint32_t *strand;     /* [n] */
+    float *at;            /* [n] 0..1 of the strand's arc length */
+    float (*position)[3]; /* [n] metres */
+};
+
+/* The control points of a cluster at `at` go where the affine map takes them. */
+struct groom_layer_frame {
+    uint32_t cluster;
+    float at;
+    float transform[3][4]; /* x' = transform[.][0..2] x + transform[.][3] */
+};
+
+struct groom_layer {
+    uint32_t n_elements;                  /* of every strand's super-helix; 0: as many as each needs */
+    struct groom_grouping grouping;       /* ruffle: who exchanges; sculpt: what frames move; curl_scale: see group */
+    struct groom_layer_anchors anchors;   /* sculpt */
+    struct groom_layer_anchors contact;   /* sculpt: what holds strands outside the head; found by the edit, kept so
+                                             that the same strands come out where there is no head */
+    uint32_t n_frames;                    /* sculpt */
+    struct groom_layer_frame *frames;
+    struct groom_strands *target;         /* interpolate: the other strands, or NULL */
+    char target_id[32];                   /* ... and where they came from; "" */
+    uint32_t target_revision;
+    int by_group;                         /* curl_scale: only `group` is changed */
+    uint32_t group;
+    int keep_turns;                       /* curl_scale: the number of turns stays, not the length */
+    int free_direction;                   /* curl_scale: strands may turn about their roots */
+};
+
+/* Room for n control points in place of what was there. returns GROOM_OK, GROOM_ENOMEM (then there are none) */
+GROOM_MUST_CHECK groom_status groom_layer_anchors_resize(struct groom_layer_anchors *anchors, uint32_t n,
+                                                         const struct groom_allocator *allocator);
+/* Room for n frames, likewise. */
+GROOM_MUST_CHECK groom_status groom_layer_frames_resize(struct groom_layer *layer, uint32_t n,
+                                                        const struct groom_allocator *allocator);
 
 /* --- the groom ------------------------------------------------------------ */
 
@@ -99,6 +183,11 @@ struct groom {
     uint32_t n_operator_guides; /* n_gop */
     uint32_t n_instancing;      /* k, guides that a strand blends */
     groom_scalp_source scalp;
+
+    uint32_t n_base;            /* vertices of the base; 0: strands are instances of guides */
+    uint32_t *first;            /* [n + 1] where each strand begins in it; else NULL */
+    float (*base)[3];           /* [n_base] dense strands as they are; else NULL */
+    char base_strands[32];      /* the upload they came from: "str_…", or "" */
 
     float (*roots)[3];          /* [n] */
     float (*root_uv)[2];        /* [n] */
@@ -122,7 +211,20 @@ struct groom_shape {
  * returns  GROOM_OK, GROOM_EINVAL (a count that is 0, m < 3, k > n_g, n_gop > n_g), GROOM_ENOMEM */
 GROOM_MUST_CHECK groom_status groom_create(struct groom_shape shape, const struct groom_context *context,
                                            struct groom **groom, struct groom_diag *diag);
+/* A groom made of strands: they are its base, vertex for vertex, in place of guides, instancing and
+ * operator guides (whose counts are 0); n_vertices is the most that a strand has. root_uv is the strands'
+ * own, or zero.
+ * strands  copied; each has at least 2 vertices
+ * returns  GROOM_OK, GROOM_EINVAL, GROOM_ENOMEM */
+GROOM_MUST_CHECK groom_status groom_create_of_strands(const struct groom_strands *strands,
+                                                      const struct groom_context *context,
+                                                      struct groom **groom, struct groom_diag *diag);
 void groom_destroy(struct groom *groom); /* takes NULL */
+/* Where strand i begins in the dense strands: i m, or first[i]. i may be n_strands. */
+size_t groom_first_vertex(const struct groom *groom, uint32_t strand);
+/* The rest of a chain: `groom` with these dense strands as its base (as many, in the same order) and
+ * the operators from `begin` to `end` - 1. A view: it borrows everything and is not destroyed. */
+struct groom groom_with_base(const struct groom *groom, const struct groom_strands *base, uint32_t begin, uint32_t end);
 /* A deep copy. */
 GROOM_MUST_CHECK groom_status groom_clone(const struct groom *groom, const struct groom_context *context,
                                           struct groom **copy, struct groom_diag *diag);
@@ -136,7 +238,8 @@ GROOM_MUST_CHECK groom_status groom_validate(const struct groom *groom, struct g
 
 /* Insert an operator at `index` (0..n_operators), enabled, with its initial parameters, an id of its
  * own, and random numbers drawn from `seed`. These three leave the groom as it was on error.
- * returns  GROOM_OK, GROOM_EINVAL (an index outside the chain, an unknown type), GROOM_ENOMEM */
+ * returns  GROOM_OK, GROOM_EINVAL (an index outside the chain, an unknown type, one that needs operator
+ *          guides where there are none), GROOM_ENOMEM */
 GROOM_MUST_CHECK groom_status groom_insert_operator(struct groom *groom, uint32_t index,
                                                     groom_operator_type type, uint64_t seed,
                                                     struct groom_diag *diag);
@@ -161,9 +264,9 @@ GROOM_MUST_CHECK groom_status groom_instance_by_distance(struct groom *groom, fl
 /* --- evaluation ------------------------------------------------------------ */
 
 /* Strands first .. first+count-1, dense.
- * groom    borrowed; has passed groom_validate
- * out      [count][m][3], the caller's
- * returns  GROOM_OK, GROOM_EINVAL (range), GROOM_ENOMEM
+ * groom    borrowed; has passed groom_validate. No layer of it is enabled: groom/layers.h evaluates those
+ * out      [count][m][3], or of a base as many vertices as the strands have; the caller's
+ * returns  GROOM_OK, GROOM_EINVAL (range; a layer), GROOM_ENOMEM
  * threads  same bits for any pool and any split into ranges */
 GROOM_MUST_CHECK groom_status groom_evaluate(const struct groom *groom, uint32_t first, uint32_t count,
                                              float (*out)[3], const struct groom_context *context,
@@ -213,7 +316,8 @@ struct groom_adjoint {
  * strand    [count] indices of the strands to visit, each at most once, or NULL for all n (then
  *           count = n)
  * gradient  made for this groom and this chain; overwritten
- * returns   GROOM_OK, GROOM_EINVAL (an index or count out of range, another chain), GROOM_ENOMEM
+ * returns   GROOM_OK, GROOM_EINVAL (an index or count out of range, another chain, a base or a layer, which
+ *           have no gradient), GROOM_ENOMEM
  * threads   same bits for any pool */
 GROOM_MUST_CHECK groom_status groom_evaluate_gradient(const struct groom *groom, const uint32_t *strand,
                                                       uint32_t count, struct groom_adjoint adjoint,
@@ -229,9 +333,10 @@ GROOM_MUST_CHECK groom_status groom_evaluate_gradient(const struct groom *groom,
 void groom_fair_order(uint32_t n, uint32_t *order);
 
 /* The groom of these strands alone: the same guides and operators, the strands' own rows and random
- * numbers, so that each evaluates to the same bits as in the whole.
+ * numbers, so that each evaluates to the same bits as in the whole. Layers, which look at all strands,
+ * cannot be had for some: select from what is behind them (groom_with_base).
  * strand   [count] indices, borrowed; may repeat
- * returns  GROOM_OK, GROOM_EINVAL (count is 0, an index out of range), GROOM_ENOMEM */
+ * returns  GROOM_OK, GROOM_EINVAL (count is 0, an index out of range, an enabled layer), GROOM_ENOMEM */
 GROOM_MUST_CHECK groom_status groom_select(const struct groom *groom, const uint32_t *strand, uint32_t count,
                                            const struct groom_context *context, struct groom **selected,
                                            struct groom_diag *diag);
