@@ -26,7 +26,7 @@ declare -A room_of_header=(
     [mesh]=geometry [spatial]=geometry [scalp]=geometry [camera]=geometry
     [strands]=strands [format]=strands
     [groom]=model [document]=model [quality]=quality
-    [fit]=fit [sample]=sample [render]=render [curvature]=curvature [retarget]=retarget
+    [fit]=fit [sample]=sample [render]=render [curvature]=curvature [analysis]=curvature [retarget]=retarget
 )
 
 check_lib_include() { # file room included

@@ -67,6 +67,17 @@ static const struct option_spec export_options[] = {
     {0},
 };
 
+static const struct option_spec analyze_options[] = {
+    {"revision", 0, "N", "of a groom (the latest)"},
+    {"count", 0, "N", "a fair sample of so many strands"},
+    {"elements", 0, "N", "helical elements of each strand; auto takes as few as meet the tolerance (auto)"},
+    {"tolerance", 0, "M", "metres between strand and super-helix at most (1 % of a mean segment)"},
+    {"straight-below", 0, "F", "turns per metre under which hair is straight (5)"},
+    {"wavy-below", 0, "B", "|beta| up to which hair is wavy and not coiled (0.5)"},
+    {"arrays", 0, "LIST", "with --json: elements,vertices,centre,switchbacks,strands"},
+    {0},
+};
+
 static const struct option_spec preview_options[] = {
     {"output", 'o', "FILE", "where to, a PNG; - is standard output"},
     {"view", 0, "V", "front, side, back or top"},
@@ -103,6 +114,7 @@ const struct command groomctl_commands[] = {
     {"list", "strands|heads|jobs|grooms", 1, 1, list_options, "what is on the server, newest first", command_list},
     {"get", "ID", 1, 1, get_options, "all about strands, a head, a job or a groom", command_get},
     {"export", "GROOM|STRANDS", 1, 1, export_options, "strands or guides into a file", command_export},
+    {"analyze", "GROOM|STRANDS", 1, 1, analyze_options, "what kind of hair it is: curls, handedness, switchbacks", command_analyze},
     {"preview", "GROOM", 1, 1, preview_options, "a shaded picture", command_preview},
     {"set", "GROOM /POINTER=VALUE...", 2, MANY, edit_options, "change a groom: /operators/2/radius=0.01", command_set},
     {"patch", "GROOM FILE", 2, 2, edit_options, "change a groom by a JSON Patch or merge patch", command_patch},

@@ -47,6 +47,7 @@ int command_losses(struct groomctl *ctl, const struct arguments *arguments);
 int command_list(struct groomctl *ctl, const struct arguments *arguments);
 int command_get(struct groomctl *ctl, const struct arguments *arguments);
 int command_export(struct groomctl *ctl, const struct arguments *arguments);
+int command_analyze(struct groomctl *ctl, const struct arguments *arguments);
 int command_preview(struct groomctl *ctl, const struct arguments *arguments);
 int command_import(struct groomctl *ctl, const struct arguments *arguments);
 int command_set(struct groomctl *ctl, const struct arguments *arguments);

@@ -47,6 +47,8 @@ struct analysis_space {
     double (*points)[3], (*centre)[3], *arc; /* [n_samples] */
 };
 
+struct tally;
+
 struct analysis_job {
     const struct groom_superhelices *helices;
     const struct groom_analysis_options *options;
@@ -54,6 +56,7 @@ struct analysis_job {
     double *wave;
     struct analysis_space *spaces;
     uint32_t n_spaces;
+    struct tally *tally;
 };
 
 /* Direction of the centre curve at a fraction of the arc: central differences at samples, between them
@@ -173,6 +176,33 @@ static groom_status list_switchbacks(const struct analysis_job *job, struct groo
 
 /* --- summary --------------------------------------------------------------------------------- */
 
+/* A pass over values with weights: sums for the mean, a fine histogram for where most of it ends. */
+#define FINE_BINS 4096
+
+struct tally {
+    double limit, sum, weight;  /* values above limit count as it */
+    double fine[FINE_BINS];
+};
+
+static void tally_add(struct tally *t, double value, double weight)
+{
+    double part = t->limit > 0.0 ? fmin(value / t->limit, 1.0) * FINE_BINS : 0.0;
+    t->sum += weight * value;
+    t->weight += weight;
+    t->fine[part < FINE_BINS ? (int)part : FINE_BINS - 1] += weight;
+}
+
+/* The upper end of a histogram that a few wild values do not press flat. */
+static double tally_most(const struct tally *t)
+{
+    double below = 0.0;
+    int k = 0;
+    for (; k < FINE_BINS; k++)
+        if ((below += t->fine[k]) >= 0.98 * t->weight)
+            break;
+    return t->limit * fmin((k + 1.0) / FINE_BINS, 1.0);
+}
+
 static void count(struct groom_histogram *h, double value, double weight)
 {
     double part = h->high > h->low ? (value - h->low) / (h->high - h->low) : 0.0;
@@ -180,30 +210,59 @@ static void count(struct groom_histogram *h, double value, double weight)
     h->weight[bin < GROOM_HISTOGRAM_BINS ? bin : GROOM_HISTOGRAM_BINS - 1] += weight;
 }
 
-static void summarize(const struct groom_superhelices *h, struct groom_analysis *out)
+/* One number of each element (or strand, with h NULL) that counts. */
+typedef double measured(const struct groom_analysis *out, uint32_t j);
+static double radius_of(const struct groom_analysis *out, uint32_t j) { return (double)out->elements[j].radius_m; }
+static double frequency_of(const struct groom_analysis *out, uint32_t j) { return (double)out->elements[j].frequency; }
+static double turns_of(const struct groom_analysis *out, uint32_t i) { return (double)out->turns[i]; }
+
+static double weight_of(const struct groom_superhelices *h, const struct groom_analysis *out, uint32_t j)
 {
-    double winding = 0.0, widest = 0.0, most = 0.0, by_kind[3] = {0.0, 0.0, 0.0};
+    return !h ? 1.0 : out->elements[j].kind == GROOM_HAIR_STRAIGHT ? 0.0 : h->length[j];
+}
+
+/* Fills a histogram and the mean; values above `limit` lie in the last bin in any case. */
+static void distribution(const struct groom_superhelices *h, const struct groom_analysis *out, measured *value,
+                         double limit, struct tally *t, struct groom_histogram *histogram, double *mean)
+{
+    uint32_t n = h ? out->n_elements : out->n_strands;
+    double widest = 0.0;
+    for (uint32_t j = 0; j < n; j++)
+        if (weight_of(h, out, j) > 0.0)
+            widest = fmax(widest, value(out, j));
+    *t = (struct tally){.limit = fmin(widest, limit)};
+    for (uint32_t j = 0; j < n; j++)
+        if (weight_of(h, out, j) > 0.0)
+            tally_add(t, value(out, j), weight_of(h, out, j));
+    *mean = t->weight > 0.0 ? t->sum / t->weight : 0.0;
+    histogram->high = tally_most(t);
+    for (uint32_t j = 0; j < n; j++)
+        if (weight_of(h, out, j) > 0.0)
+            count(histogram, value(out, j), weight_of(h, out, j));
+}
+
+static void share_length(const struct groom_superhelices *h, struct groom_analysis *out)
+{
+    double by_kind[3] = {0.0, 0.0, 0.0}, by_hand[3] = {0.0, 0.0, 0.0};
     for (uint32_t j = 0; j < h->n_elements; j++) {
         by_kind[out->elements[j].kind] += h->length[j];
-        if (out->elements[j].kind == GROOM_HAIR_STRAIGHT)
-            continue;
-        winding += h->length[j];
-        out->summary.radius_mean_m += h->length[j] * (double)out->elements[j].radius_m;
-        widest = fmax(widest, (double)out->elements[j].radius_m);
-    }
-    for (uint32_t i = 0; i < h->n_strands; i++)
-        most = fmax(most, (double)out->turns[i]);
-    out->summary.length_m = by_kind[0] + by_kind[1] + by_kind[2];
-    for (int k = 0; k < 3; k++)
-        out->summary.share[k] = out->summary.length_m > 0.0 ? by_kind[k] / out->summary.length_m : 0.0;
-    out->summary.radius_mean_m = winding > 0.0 ? out->summary.radius_mean_m / winding : 0.0;
-    out->summary.radius.high = fmin(widest, WIDEST_CURL_M);
-    out->summary.turns.high = most;
-    for (uint32_t j = 0; j < h->n_elements; j++)
         if (out->elements[j].kind != GROOM_HAIR_STRAIGHT)
-            count(&out->summary.radius, (double)out->elements[j].radius_m, h->length[j]);
-    for (uint32_t i = 0; i < h->n_strands; i++)
-        count(&out->summary.turns, (double)out->turns[i], 1.0);
+            by_hand[out->elements[j].hand + 1] += h->length[j];
+    }
+    double length = out->summary.length_m = by_kind[0] + by_kind[1] + by_kind[2];
+    double winding = by_hand[0] + by_hand[1] + by_hand[2];
+    for (int k = 0; k < 3; k++) {
+        out->summary.share[k] = length > 0.0 ? by_kind[k] / length : 0.0;
+        out->summary.share_hand[k] = winding > 0.0 ? by_hand[k] / winding : 0.0;
+    }
+}
+
+static void summarize(const struct groom_superhelices *h, struct groom_analysis *out, struct tally *t)
+{
+    share_length(h, out);
+    distribution(h, out, radius_of, WIDEST_CURL_M, t, &out->summary.radius, &out->summary.radius_mean_m);
+    distribution(h, out, frequency_of, INFINITY, t, &out->summary.frequency, &out->summary.frequency_mean);
+    distribution(NULL, out, turns_of, INFINITY, t, &out->summary.turns, &out->summary.turns_mean);
 }
 
 /* --- the whole -------------------------------------------------------------------------------- */
@@ -259,7 +318,8 @@ static int job_init(struct analysis_job *job, const struct groom_context *contex
     job->out = create_analysis(job->helices, n, a);
     job->wave = memory_array(a, 2 * (size_t)n, sizeof *job->wave);
     job->spaces = memory_array_zero(a, job->n_spaces, sizeof *job->spaces);
-    int good = job->out && job->wave && job->spaces;
+    job->tally = memory_array(a, 1, sizeof *job->tally);
+    int good = job->out && job->wave && job->spaces && job->tally;
     for (uint32_t k = 0; good && k < job->n_spaces; k++) {
         struct analysis_space *s = &job->spaces[k];
         s->points = memory_array(a, n, sizeof *s->points);
@@ -281,6 +341,7 @@ static void job_finish(struct analysis_job *job, const struct groom_context *con
     }
     memory_release(a, job->spaces, job->n_spaces, sizeof *job->spaces);
     memory_release(a, job->wave, 2 * (size_t)n, sizeof *job->wave);
+    memory_release(a, job->tally, 1, sizeof *job->tally);
     groom_analysis_destroy(job->out);
 }
 
@@ -301,7 +362,7 @@ groom_status groom_superhelices_analyze(const struct groom_superhelices *helices
     parallel_for(context, piece_count(helices->n_strands), analyze_piece, &job);
     if ((st = list_switchbacks(&job, diag)) != GROOM_OK)
         goto out;
-    summarize(helices, job.out);
+    summarize(helices, job.out, job.tally);
     *analysis = job.out;
     job.out = NULL;
 out:

@@ -12,9 +12,8 @@ static int compare_indices(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-/* The first `count` strands of the fair order, back in the order of the groom. */
-static groom_status select_fairly(const struct groom *groom, uint32_t count, struct groom **selected,
-                                  struct groom_diag *diag)
+groom_status select_fairly(const struct groom *groom, uint32_t count, struct groom **selected, uint32_t **index,
+                           struct groom_diag *diag)
 {
     uint32_t *order = malloc(groom->n_strands * sizeof *order);
     if (!order)
@@ -22,7 +21,10 @@ static groom_status select_fairly(const struct groom *groom, uint32_t count, str
     groom_fair_order(groom->n_strands, order);
     qsort(order, count, sizeof *order, compare_indices);
     groom_status status = groom_select(groom, order, count, NULL, selected, diag);
-    free(order);
+    if (status == GROOM_OK && index)
+        *index = order;
+    else
+        free(order);
     return status;
 }
 
@@ -71,7 +73,7 @@ groom_status grooms_write_strands(struct grooms *grooms, const char *groom_id, c
         status = groom_fail_field(diag, GROOM_EINVAL, "/count", "the groom has %u strands: ask for at most as many",
                                   model->groom->n_strands);
     else if (what->count && what->count < model->groom->n_strands)
-        status = select_fairly(model->groom, what->count, &fewer, diag);
+        status = select_fairly(model->groom, what->count, &fewer, NULL, diag);
     if (status == GROOM_OK)
         status = write_groom(grooms, fewer ? fewer : model->groom, &what->write, sink, diag);
     groom_destroy(fewer);

@@ -114,6 +114,21 @@ GROOM_MUST_CHECK groom_status grooms_write_guides(struct grooms *grooms, const c
                                                   const struct grooms_export *what, struct groom_sink sink,
                                                   struct groom_diag *diag);
 
+/* All strands of a revision at once. */
+struct grooms_dense {
+    struct groom_strands *strands;
+    uint32_t *index;   /* [strands->n_strands] which of the groom's these are, rising; NULL: all */
+    uint32_t n_of;     /* strands of the groom */
+    uint32_t revision;
+};
+/* count  of a fair sample; 0, or as many as there are: all. */
+GROOM_MUST_CHECK groom_status grooms_dense(struct grooms *grooms, const char *groom_id, uint32_t revision,
+                                           uint32_t count, struct grooms_dense *dense, struct groom_diag *diag);
+void grooms_dense_finish(struct grooms_dense *dense); /* takes zeroed */
+
+/* The pool that evaluation takes turns in, for those who compute with strands. */
+const struct groom_context *grooms_context(const struct grooms *grooms);
+
 /* A shaded picture of the dense strands on the head that the groom was fitted with, as PNG bytes
  * (malloc'ed). */
 GROOM_MUST_CHECK groom_status grooms_preview(struct grooms *grooms, const char *groom_id, uint32_t revision,

@@ -63,6 +63,13 @@ groom_status models_acquire(struct grooms *grooms, const char *groom_id, uint32_
                             struct groom_diag *diag);
 void models_release(struct grooms *grooms, struct model *model);
 
+/* --- fewer strands (export.c) ---------------------------------------------------------------- */
+
+/* The first `count` strands of the fair order, back in the order of the groom.
+ * index  which these are, malloc'ed; or NULL where nobody asks */
+groom_status select_fairly(const struct groom *groom, uint32_t count, struct groom **selected, uint32_t **index,
+                           struct groom_diag *diag);
+
 /* --- documents as trees (documents.c) ------------------------------------------------------- */
 
 /* The stored revision (0: the latest) and its document's tree. On GROOM_OK both are the caller's. */

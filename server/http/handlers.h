@@ -61,4 +61,10 @@ int grooms_check_edit(struct request *request);
 void grooms_call_revert(struct request *request);
 void grooms_call_preview(struct request *request);
 
+/* analysis_calls.c: strands in curvature space, of grooms and of uploads */
+void analysis_call_groom(struct request *request);
+void analysis_call_strands(struct request *request);
+void clusters_call_groom(struct request *request);
+void clusters_call_strands(struct request *request);
+
 #endif

@@ -15,6 +15,8 @@ const struct route http_routes[] = {
     {"GET", "/v1/strands", assets_list_strands, BODY_NONE, LANE_FAST, "limit before", 0, NULL},
     {"GET", "/v1/strands/{id}", assets_get_strands, BODY_NONE, LANE_FAST, "", 0, NULL},
     {"GET", "/v1/strands/{id}/data", assets_get_strands_data, BODY_NONE, LANE_SLOW, "format unit up", 0, NULL},
+    {"GET", "/v1/strands/{id}/analysis", analysis_call_strands, BODY_NONE, LANE_SLOW, "count elements tolerance straight_below wavy_below arrays format", 0, NULL},
+    {"GET", "/v1/strands/{id}/clusters", clusters_call_strands, BODY_NONE, LANE_SLOW, "count seed frames", 0, NULL},
     {"POST", "/v1/heads", assets_post_head, BODY_BLOB, LANE_SLOW, "format unit up name", 0, assets_check_upload},
     {"GET", "/v1/heads", assets_list_heads, BODY_NONE, LANE_FAST, "limit before", 0, NULL},
     {"GET", "/v1/heads/{id}", assets_get_head, BODY_NONE, LANE_FAST, "", 0, NULL},
@@ -37,6 +39,8 @@ const struct route http_routes[] = {
     {"GET", "/v1/grooms/{id}/revisions", grooms_call_revisions, BODY_NONE, LANE_FAST, "limit before", 0, NULL},
     {"POST", "/v1/grooms/{id}/revert", grooms_call_revert, BODY_MEMORY, LANE_FAST, "", 0, grooms_check_edit},
     {"GET", "/v1/grooms/{id}/preview.png", grooms_call_preview, BODY_NONE, LANE_SLOW, "view size revision", 0, NULL},
+    {"GET", "/v1/grooms/{id}/analysis", analysis_call_groom, BODY_NONE, LANE_SLOW, "revision count elements tolerance straight_below wavy_below arrays format", 0, NULL},
+    {"GET", "/v1/grooms/{id}/clusters", clusters_call_groom, BODY_NONE, LANE_SLOW, "revision count seed frames", 0, NULL},
 
     {"GET", "/v1/work/job", work_call_job, BODY_NONE, LANE_FAST, "", ROUTE_WORK, NULL},
     {"GET", "/v1/work/blobs/{sha256}", work_call_blob, BODY_NONE, LANE_FAST, "", ROUTE_WORK, NULL},

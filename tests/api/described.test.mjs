@@ -7,7 +7,7 @@ import { readFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { events, expect, groom_document, head_obj, startIdleDaemon, submit, upload, strands_json } from '../support/api.mjs';
-import { operations, seen } from '../support/openapi.mjs';
+import { operations, seen, resolved } from '../support/openapi.mjs';
 
 const here = dirname(fileURLToPath(import.meta.url));
 
@@ -21,8 +21,7 @@ test('the table of routes and the description name the same calls', () => {
   assert.deepEqual(routes.map(({ method, path }) => `${method} ${path}`).sort(), operations.map(({ method, path }) => `${method} ${path}`).sort());
   for (const { method, path, query } of routes) {
     const { operation } = operations.find((entry) => entry.method === method && entry.path === path);
-    const described = (operation.parameters ?? []).map((parameter) => parameter.$ref?.split('/').pop() ?? (parameter.in === 'query' ? parameter.name : ''))
-      .map((name) => (name === 'exportFormat' ? 'format' : name)).filter((name) => name && name !== 'ifMatch');
+    const described = (operation.parameters ?? []).map(resolved).filter((parameter) => parameter.in === 'query').map(({ name }) => name);
     assert.deepEqual(query.split(' ').filter(Boolean).sort(), described.sort(), `query of ${method} ${path}`);
   }
 });
@@ -67,6 +66,10 @@ test('every operation answers as it is described', async (t) => {
   await get(`${groom}/revisions`);
   await expect(daemon, 201, 'POST', `${groom}/revert`, { headers: { 'If-Match': '"3"' }, body: { revision: 1 } });
   await get(`${groom}/preview.png?size=64`);
+  for (const at of [groom, `/v1/strands/${strands.id}`]) {
+    await get(`${at}/analysis`);
+    await get(`${at}/clusters?count=3`);
+  }
 
   const missing = operations.map(({ operation }) => operation.operationId).filter((id) => !seen.has(id));
   assert.deepEqual(missing, [], 'operations that no call exercised');

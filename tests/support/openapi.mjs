@@ -19,7 +19,8 @@ const ajv = new Ajv({ strict: false, allErrors: true });
 addFormats(ajv);
 ajv.addSchema({ $id: 'api', ...document });
 
-const resolved = (node) => (node?.$ref ? node.$ref.slice(2).split('/').reduce((at, key) => at[key], document) : node);
+/** A node, or what its $ref names. */
+export const resolved = (node) => (node?.$ref ? node.$ref.slice(2).split('/').reduce((at, key) => at[key], document) : node);
 
 /** [{ method, path, pattern, operation }] of everything that is described. */
 export const operations = Object.entries(document.paths).flatMap(([path, item]) =>

@@ -300,7 +300,7 @@ struct groom_switchback {
 
 #define GROOM_HISTOGRAM_BINS 32
 struct groom_histogram {
-    double low, high;                    /* of the whole; what lies above is in the last bin */
+    double low, high;                    /* 98 % of all weight lie below high; what lies above is in the last bin */
     double weight[GROOM_HISTOGRAM_BINS]; /* metres of hair, or strands; see below */
 };
 
@@ -314,8 +314,12 @@ struct groom_analysis {
     struct {
         double length_m;                  /* of all strands */
         double share[3];                  /* of that length, by groom_hair_kind */
+        double share_hand[3];             /* of coiled and wavy length: left, none, right */
         double radius_mean_m;             /* over coiled and wavy length */
+        double frequency_mean;            /* turns per metre, over coiled and wavy length */
+        double turns_mean;                /* of a strand */
         struct groom_histogram radius;    /* metres; weight: coiled and wavy length */
+        struct groom_histogram frequency; /* turns per metre; weight: coiled and wavy length */
         struct groom_histogram turns;     /* turns of a strand; weight: strands */
     } summary;
     const struct groom_allocator *allocator;
