@@ -22,10 +22,11 @@ static groom_status pass_fence(struct connection *c, const struct store_attempt_
 {
     struct query q = query_open(c,
                                 "SELECT jobs.cancel_requested FROM attempts JOIN jobs ON jobs.id = attempts.job_id"
-                                " WHERE job_id = ?1 AND number = ?2 AND attempts.state = 0"
+                                " WHERE job_id = ?1 AND number = ?2 AND run <= ?3 AND attempts.state = 0"
                                 " AND jobs.state = 1 AND jobs.attempt = number", diag);
     query_text(&q, 1, ref->job_id);
     query_integer(&q, 2, ref->number);
+    query_integer(&q, 3, ref->run);
     bool passed = query_row(&q);
     if (passed && cancel)
         *cancel = query_int64(&q, 0) != 0;
@@ -36,10 +37,10 @@ static groom_status pass_fence(struct connection *c, const struct store_attempt_
     return status;
 }
 
-groom_status store_attempt_find(struct store *store, const char *token_hash, struct store_attempt_ref *ref,
-                                struct groom_diag *diag)
+groom_status store_attempt_find(struct store *store, const char *token_hash, uint32_t run,
+                                struct store_attempt_ref *ref, struct groom_diag *diag)
 {
-    struct store_attempt_ref found = {0};
+    struct store_attempt_ref found = {.run = run};
     struct connection *c = read_begin(store);
     struct query q = query_open(c, "SELECT job_id, number FROM attempts WHERE token_hash = ?1", diag);
     query_text(&q, 1, token_hash);
@@ -70,6 +71,41 @@ groom_status store_attempt_launched(struct store *store, const struct store_atte
     query_integer(&q, 2, ref->number);
     query_text(&q, 3, handle);
     return transaction_end(c, query_run(&q, NULL), diag);
+}
+
+/* An update of an attempt that may speak: `sql` takes job, number and `value`. */
+static groom_status update_fenced(struct store *store, const struct store_attempt_ref *ref, const char *sql,
+                                  const char *text, int64_t integer, struct groom_diag *diag)
+{
+    struct connection *c;
+    groom_status status = transaction_begin(store, &c, diag);
+    if (status != GROOM_OK)
+        return status;
+    if ((status = pass_fence(c, ref, NULL, diag)) == GROOM_OK) {
+        struct query q = query_open(c, sql, diag);
+        query_text(&q, 1, ref->job_id);
+        query_integer(&q, 2, ref->number);
+        query_integer(&q, 3, integer);
+        if (text)
+            query_text(&q, 4, text);
+        status = query_run(&q, NULL);
+    }
+    return transaction_end(c, status, diag);
+}
+
+groom_status store_attempt_begin_run(struct store *store, const struct store_attempt_ref *ref,
+                                     struct groom_diag *diag)
+{
+    return update_fenced(store, ref, "UPDATE attempts SET run = ?3 WHERE job_id = ?1 AND number = ?2", NULL,
+                         ref->run, diag);
+}
+
+groom_status store_attempt_ended(struct store *store, const struct store_attempt_ref *ref,
+                                 const char *last_words, struct groom_diag *diag)
+{
+    return update_fenced(store, ref,
+                         "UPDATE attempts SET finished = ?3, last_words = ?4 WHERE job_id = ?1 AND number = ?2",
+                         last_words, store_now_ms(), diag);
 }
 
 /* --- what it reports --------------------------------------------------------------------- */

@@ -64,7 +64,10 @@ static const char version_1[] =
     "  key TEXT NOT NULL PRIMARY KEY, request_hash TEXT NOT NULL, job_id TEXT NOT NULL REFERENCES jobs (id),"
     "  created INTEGER NOT NULL) STRICT;";
 
-const char *const schema_steps[] = {version_1};
+/* a cluster may run an attempt more than once */
+static const char version_2[] = "ALTER TABLE attempts ADD COLUMN run INTEGER NOT NULL DEFAULT 0;";
+
+const char *const schema_steps[] = {version_1, version_2};
 const int schema_version = sizeof schema_steps / sizeof schema_steps[0];
 
 static groom_status read_version(sqlite3 *db, int *version, struct groom_diag *diag)

@@ -247,6 +247,10 @@ GROOM_MUST_CHECK groom_status store_job_request_cancel(struct store *store, cons
 struct store_attempt_ref {
     char job_id[STORE_ID_SIZE];
     uint32_t number; /* from 1 */
+    /* Which run of the attempt is speaking: a cluster that loses a node starts the same attempt again
+     * elsewhere, and counts. Once a run has begun (store_attempt_begin_run), those before it are fenced
+     * off, too. Always 0 for a process of this machine. */
+    uint32_t run;
 };
 
 enum store_attempt_state {
@@ -265,7 +269,8 @@ struct store_attempt {
     enum store_attempt_state state;
     char *handle;     /* the launcher's name for its process; "" before it was launched */
     char *last_words; /* the tail of its stderr, with how it ended; "" */
-    int64_t started_ms, finished_ms;
+    int64_t started_ms;
+    int64_t finished_ms; /* of a running one: its process has said that it ends (store_attempt_ended) */
 };
 
 struct store_attempt_list {
@@ -282,10 +287,17 @@ GROOM_MUST_CHECK groom_status store_job_take(struct store *store, const char *to
 /* The handle that the launcher gave. */
 GROOM_MUST_CHECK groom_status store_attempt_launched(struct store *store, const struct store_attempt_ref *ref,
                                                      const char *handle, struct groom_diag *diag);
-/* The attempt whose token has this hash.
+/* The attempt whose token has this hash, as its `run`th run speaks.
  * returns  GROOM_ENOTFOUND (no such token), GROOM_ECONFLICT (it has ended, or another has begun) */
-GROOM_MUST_CHECK groom_status store_attempt_find(struct store *store, const char *token_hash,
+GROOM_MUST_CHECK groom_status store_attempt_find(struct store *store, const char *token_hash, uint32_t run,
                                                  struct store_attempt_ref *ref, struct groom_diag *diag);
+/* ref->run begins: runs before it are refused from now on. returns  GROOM_ECONFLICT (fenced) */
+GROOM_MUST_CHECK groom_status store_attempt_begin_run(struct store *store, const struct store_attempt_ref *ref,
+                                                      struct groom_diag *diag);
+/* Its process says that it ends without a result, and why; the supervisor draws the conclusion.
+ * returns  GROOM_ECONFLICT (fenced) */
+GROOM_MUST_CHECK groom_status store_attempt_ended(struct store *store, const struct store_attempt_ref *ref,
+                                                  const char *last_words, struct groom_diag *diag);
 /* All attempts of a job, oldest first; job_id NULL: all that are running. */
 GROOM_MUST_CHECK groom_status store_attempts_list(struct store *store, const char *job_id,
                                                   struct store_attempt_list *list, struct groom_diag *diag);

@@ -528,19 +528,49 @@ START_TEST(a_stale_attempt_is_fenced_off)
     bool cancel;
     make_job(store, "job_a", 0);
     struct store_attempt_ref first = take(store, HASH_A);
-    ck_ok(store_attempt_find(store, HASH_A, &found, &diag));
+    ck_ok(store_attempt_find(store, HASH_A, 0, &found, &diag));
     ck_assert_uint_eq(found.number, 1);
     ck_ok(move(store, "job_a", STORE_JOB_RUNNING, STORE_JOB_QUEUED, 1, STORE_ATTEMPT_DIED));
-    ck_status(store_attempt_find(store, HASH_A, &found, &diag), GROOM_ECONFLICT);
+    ck_status(store_attempt_find(store, HASH_A, 0, &found, &diag), GROOM_ECONFLICT);
     struct store_attempt_ref second = take(store, HASH_B);
     ck_assert_uint_eq(second.number, 2);
-    ck_status(store_attempt_find(store, HASH_A, &found, &diag), GROOM_ECONFLICT);
-    ck_status(store_attempt_find(store, HASH_C, &found, &diag), GROOM_ENOTFOUND);
+    ck_status(store_attempt_find(store, HASH_A, 0, &found, &diag), GROOM_ECONFLICT);
+    ck_status(store_attempt_find(store, HASH_C, 0, &found, &diag), GROOM_ENOTFOUND);
     ck_status(store_attempt_progress(store, &first, &progress, &cancel, &diag), GROOM_ECONFLICT);
     ck_status(store_attempt_checkpoint(store, &first, &checkpoint, replaced, &diag), GROOM_ECONFLICT);
     ck_status(move(store, "job_a", STORE_JOB_RUNNING, STORE_JOB_SUCCEEDED, 1, STORE_ATTEMPT_SUCCEEDED),
               GROOM_ECONFLICT);
     ck_ok(store_attempt_progress(store, &second, &progress, &cancel, &diag));
+    close_all(store);
+}
+END_TEST
+
+/* A cluster lost the node and started the same attempt elsewhere; then the node comes back. */
+START_TEST(a_stale_run_of_an_attempt_is_fenced_off)
+{
+    struct store *store = open_new();
+    struct store_attempt_ref run_0, run_2, again;
+    struct store_progress progress = {.progress = 0.5, .eta_s = -1};
+    bool cancel;
+    make_job(store, "job_a", 0);
+    take(store, HASH_A);
+    ck_ok(store_attempt_find(store, HASH_A, 0, &run_0, &diag));
+    ck_ok(store_attempt_begin_run(store, &run_0, &diag));
+    ck_ok(store_attempt_find(store, HASH_A, 2, &run_2, &diag));
+    ck_ok(store_attempt_progress(store, &run_0, &progress, &cancel, &diag)); /* the other has not begun */
+    ck_ok(store_attempt_begin_run(store, &run_2, &diag));
+    ck_status(store_attempt_progress(store, &run_0, &progress, &cancel, &diag), GROOM_ECONFLICT);
+    ck_status(store_attempt_begin_run(store, &run_0, &diag), GROOM_ECONFLICT);
+    ck_status(store_attempt_ended(store, &run_0, "late", &diag), GROOM_ECONFLICT);
+    ck_status(store_attempt_find(store, HASH_A, 1, &again, &diag), GROOM_ECONFLICT);
+    ck_ok(store_attempt_progress(store, &run_2, &progress, &cancel, &diag));
+    ck_ok(store_attempt_ended(store, &run_2, "signal 11", &diag));
+    struct store_attempt_list attempts;
+    ck_ok(store_attempts_list(store, "job_a", &attempts, &diag));
+    ck_assert_int_eq(attempts.items[0].state, STORE_ATTEMPT_RUNNING);
+    ck_assert_int_gt(attempts.items[0].finished_ms, 0);
+    ck_assert_str_eq(attempts.items[0].last_words, "signal 11");
+    store_attempt_list_finish(&attempts);
     close_all(store);
 }
 END_TEST
@@ -854,7 +884,7 @@ TEST_SUITE("store", a_look_waits_for_no_writer, readers_cannot_write_or_checkpoi
            grooms_and_revisions_are_listed, jobs_are_taken_by_priority_then_age,
            an_idempotency_key_stands_for_one_request, only_the_drawn_transitions_are_allowed,
            success_and_its_groom_are_one_transaction,
-           a_job_that_is_to_be_cancelled_neither_succeeds_nor_queues_again, a_stale_attempt_is_fenced_off,
+           a_job_that_is_to_be_cancelled_neither_succeeds_nor_queues_again, a_stale_attempt_is_fenced_off, a_stale_run_of_an_attempt_is_fenced_off,
            a_back_off_holds_a_job_back, a_checkpoint_replaces_the_one_before_and_goes_with_the_job,
            events_are_numbered_without_gaps, a_loss_that_is_reported_again_is_kept_once,
            progress_leaves_alone_what_it_does_not_name, no_job_is_taken_twice,
