@@ -13,6 +13,8 @@
  *   POST /v1/work/progress             200 {"cancel":bool}; body: the progress message (below)
  *   POST /v1/work/result               2xx; body: the groom document. Ends the attempt
  *   POST /v1/work/failed               2xx; body: a problem (proto/problem.h). Ends the attempt
+ *   POST /v1/work/ended                2xx; body: {"words":"..."}: the process ends without either, and
+ *                                      why; for launchers that learn late, or never, how it ended
  *
  * The order:
  *   {"job":"job_...","kind":"fit","attempt":1,"options":{...},"request":{...},
@@ -26,6 +28,10 @@
  *   {"stage":{"name","index","count"},"progress":0..1,"eta_s":seconds,
  *    "losses":[{"stage","iteration","name","value"},...]}
  *
+ * A cluster that loses a node may start the same attempt elsewhere, with the same environment. Each
+ * start is a run, numbered by GROOM_WORK_RUN from 0; the nth says `Bearer <token>.<n>`. Once a run has
+ * asked for its order, the runs before it are fenced off.
+ *
  * A process that gets SIGTERM saves a checkpoint and exits with WORK_EXIT_STOPPED: the attempt may
  * be begun again, from there. */
 #ifndef PROTO_WORK_H
@@ -34,6 +40,9 @@
 #define WORK_ENV_URL     "GROOM_WORK_URL"     /* http://127.0.0.1:8080 */
 #define WORK_ENV_TOKEN   "GROOM_WORK_TOKEN"
 #define WORK_ENV_THREADS "GROOM_WORK_THREADS" /* missing or 0: one for each processor */
+#define WORK_ENV_RUN     "GROOM_WORK_RUN"     /* missing: 0 */
+/* Seconds that a daemon which does not answer is waited for; missing: 60. */
+#define WORK_ENV_PATIENCE "GROOM_WORK_PATIENCE"
 
 #define WORK_PATH_JOB        "/v1/work/job"
 #define WORK_PATH_BLOBS      "/v1/work/blobs" /* "/{sha256}" */
@@ -41,6 +50,7 @@
 #define WORK_PATH_PROGRESS   "/v1/work/progress"
 #define WORK_PATH_RESULT     "/v1/work/result"
 #define WORK_PATH_FAILED     "/v1/work/failed"
+#define WORK_PATH_ENDED      "/v1/work/ended"
 
 /* How an attempt's process ends. Anything else (a signal, another status) is a crash. */
 #define WORK_EXIT_DONE    0  /* the result was acknowledged */

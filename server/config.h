@@ -20,6 +20,7 @@ struct config {
     char listen[CONFIG_TEXT_SIZE]; /* HOST:PORT */
     char worker[CONFIG_TEXT_SIZE]; /* path of groom-worker; "": beside groomd */
     char launcher[CONFIG_TEXT_SIZE];
+    char work_url[CONFIG_TEXT_SIZE], work_folder[CONFIG_TEXT_SIZE], slurm_arguments[CONFIG_TEXT_SIZE];
     char hosts[CONFIG_TEXT_SIZE];  /* names of this service, blanks between */
     char config[CONFIG_TEXT_SIZE]; /* the configuration file */
     /* counts, bytes, seconds */
@@ -27,6 +28,7 @@ struct config {
     uint64_t max_upload, max_body, min_free, export_cache;
     uint64_t http_threads, fast_threads, slow_threads, slow_queue;
     uint64_t connections, idle_timeout_s, head_timeout_s, min_rate;
+    uint64_t slurm_interval_s;
     uint64_t parse_time_s, parse_memory;
     uint64_t max_wait_s, shutdown_s;
     uint64_t log_level; /* enum config_log_level */

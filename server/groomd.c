@@ -15,6 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "proto/work.h"
 #include "server/blobs/blobs.h"
 #include "server/config.h"
 #include "server/grooms/grooms.h"
@@ -30,8 +31,8 @@
 struct daemon {
     struct config config;
     int lock_fd;
-    char worker[PATH_SIZE], temporary[PATH_SIZE], logs[PATH_SIZE], threads[48];
-    const char *worker_argv[3], *worker_env[2];
+    char worker[PATH_SIZE], temporary[PATH_SIZE], logs[PATH_SIZE], node_logs[PATH_SIZE], threads[48];
+    const char *worker_argv[4], *worker_env[2];
     struct listening listening;
     struct blobs *blobs;
     struct store *store;
@@ -104,7 +105,7 @@ static groom_status find_worker(struct daemon *daemon, struct groom_diag *diag)
     return GROOM_OK;
 }
 
-/* Workers share the processors. */
+/* Workers share the processors of this machine. */
 static void choose_threads(struct daemon *daemon)
 {
     const struct config *config = &daemon->config;
@@ -114,8 +115,35 @@ static void choose_threads(struct daemon *daemon)
         threads = processors > (long)config->workers ? (unsigned long long)processors / config->workers : 1;
     snprintf(daemon->threads, sizeof daemon->threads, "GROOM_WORK_THREADS=%llu", threads);
     daemon->worker_env[0] = daemon->threads;
+}
+
+/* A daemon of a cluster may be away for a while without its workers giving up. */
+static groom_status create_launcher(struct daemon *daemon, struct groom_diag *diag)
+{
+    const struct config *config = &daemon->config;
     daemon->worker_argv[0] = daemon->worker;
     daemon->worker_argv[1] = "attempt";
+    if (!strcmp(config->launcher, "local")) {
+        choose_threads(daemon);
+        return launch_local_create(&daemon->launcher, diag);
+    }
+    if (strcmp(config->launcher, "slurm"))
+        return groom_fail(diag, GROOM_EINVAL, "--launcher %.60s: there are local and slurm", config->launcher);
+    daemon->worker_argv[2] = "--watched";
+    daemon->worker_env[0] = WORK_ENV_PATIENCE "=900";
+    if (config->work_folder[0]) {
+        snprintf(daemon->node_logs, sizeof daemon->node_logs, "%.1000s/logs", config->work_folder);
+        char blobs[PATH_SIZE];
+        snprintf(blobs, sizeof blobs, "%.1000s/blobs", config->work_folder);
+        jobs_share_blobs(daemon->jobs, blobs);
+    }
+    const struct launch_slurm_options options = {.folder = config->data,
+                                                 .log_folder = daemon->node_logs,
+                                                 .arguments = config->slurm_arguments,
+                                                 .interval_ms = (uint32_t)config->slurm_interval_s * 1000,
+                                                 .stale = jobs_attempt_is_stale,
+                                                 .user = daemon->jobs};
+    return launch_slurm_create(&options, &daemon->launcher, diag);
 }
 
 /* --- the rooms ------------------------------------------------------------------------------ */
@@ -155,12 +183,8 @@ static groom_status open_grooms(struct daemon *daemon, struct groom_diag *diag)
 static groom_status start_supervisor(struct daemon *daemon, struct groom_diag *diag)
 {
     const struct config *config = &daemon->config;
-    groom_status status;
-    if (strcmp(config->launcher, "local"))
-        return groom_fail(diag, GROOM_EINVAL, "--launcher %.60s: this version has local alone",
-                          config->launcher);
-    choose_threads(daemon);
-    if ((status = launch_local_create(&daemon->launcher, diag)) != GROOM_OK)
+    groom_status status = create_launcher(daemon, diag);
+    if (status != GROOM_OK)
         return status;
     const struct supervisor_options options = {
         .n_slots = (uint32_t)config->workers,
@@ -168,9 +192,12 @@ static groom_status start_supervisor(struct daemon *daemon, struct groom_diag *d
         .launcher = daemon->launcher,
         .worker_argv = daemon->worker_argv,
         .worker_env = daemon->worker_env,
-        .work_url = daemon->listening.url,
+        .work_url = config->work_url[0] ? config->work_url : daemon->listening.url,
         .log_folder = daemon->logs,
-        .limits = {.memory_bytes = config->worker_memory, .cpu_s = config->job_time_s}};
+        .limits = {.memory_bytes = config->worker_memory, .cpu_s = config->job_time_s},
+        .size = {.threads = (uint32_t)config->worker_threads,
+                 .memory_bytes = config->worker_memory,
+                 .wall_s = config->job_time_s}};
     return supervisor_start(daemon->jobs, &options, &daemon->supervisor, diag);
 }
 

@@ -45,6 +45,7 @@ int work_check_stage(struct request *request);
 void work_call_checkpoint(struct request *request);
 void work_call_result(struct request *request);
 void work_call_failed(struct request *request);
+void work_call_ended(struct request *request);
 
 /* groom_calls.c */
 void grooms_call_list(struct request *request);

@@ -48,6 +48,7 @@ const struct route http_routes[] = {
     {"PUT", "/v1/work/checkpoint", work_call_checkpoint, BODY_BLOB, LANE_SLOW, "stage", ROUTE_WORK, work_check_stage},
     {"POST", "/v1/work/result", work_call_result, BODY_FILE, LANE_SLOW, "", ROUTE_WORK, NULL},
     {"POST", "/v1/work/failed", work_call_failed, BODY_MEMORY, LANE_FAST, "", ROUTE_WORK, NULL},
+    {"POST", "/v1/work/ended", work_call_ended, BODY_MEMORY, LANE_FAST, "", ROUTE_WORK, NULL},
 };
 /* clang-format on */
 const size_t http_n_routes = sizeof http_routes / sizeof http_routes[0];

@@ -25,7 +25,9 @@ void work_call_job(struct request *request)
 {
     char *text;
     struct groom_diag diag = {0};
-    groom_status status = work_describe(request->service->jobs, &request->attempt, &text, &diag);
+    groom_status status = work_begin(request->service->jobs, &request->attempt, &diag);
+    if (status == GROOM_OK)
+        status = work_describe(request->service->jobs, &request->attempt, &text, &diag);
     if (status != GROOM_OK)
         respond_failure(request, status, &diag);
     else
@@ -152,5 +154,13 @@ void work_call_failed(struct request *request)
     struct groom_diag diag = {0};
     groom_status status = work_failed(request->service->jobs, &request->attempt,
                                       request->body ? request->body : "", request->n_body, &diag);
+    respond_done(request, status, &diag);
+}
+
+void work_call_ended(struct request *request)
+{
+    struct groom_diag diag = {0};
+    groom_status status = work_ended(request->service->jobs, &request->attempt,
+                                     request->body ? request->body : "", request->n_body, &diag);
     respond_done(request, status, &diag);
 }

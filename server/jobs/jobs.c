@@ -1,5 +1,6 @@
 #include "server/jobs/jobs.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -24,6 +25,27 @@ void jobs_destroy(struct jobs *jobs)
         return;
     pthread_mutex_destroy(&jobs->lock);
     free(jobs);
+}
+
+void jobs_share_blobs(struct jobs *jobs, const char *folder)
+{
+    snprintf(jobs->shared_blobs, sizeof jobs->shared_blobs, "%s", folder);
+}
+
+bool jobs_attempt_is_stale(void *user, const char *name)
+{
+    struct jobs *jobs = user;
+    struct store_job job = {0};
+    char id[STORE_ID_SIZE];
+    const char *dot = strrchr(name, '.');
+    if (!dot || dot - name >= STORE_ID_SIZE)
+        return false;
+    snprintf(id, sizeof id, "%.*s", (int)(dot - name), name);
+    if (store_job_get(jobs->store, id, &job, NULL) != GROOM_OK)
+        return false; /* another daemon's, or nobody can tell */
+    bool runs = job.state == STORE_JOB_RUNNING && job.attempt == (uint32_t)strtoul(dot + 1, NULL, 10);
+    store_job_finish(&job);
+    return !runs;
 }
 
 /* --- watching ------------------------------------------------------------------------- */
@@ -90,7 +112,7 @@ void jobs_set_nudge(struct jobs *jobs, void (*nudge)(void *user), void *user)
     pthread_mutex_unlock(&jobs->lock);
 }
 
-static void nudge(struct jobs *jobs)
+void jobs_nudge(struct jobs *jobs)
 {
     pthread_mutex_lock(&jobs->lock);
     if (jobs->nudge)
@@ -126,7 +148,7 @@ groom_status jobs_move(struct jobs *jobs, const struct store_job_move *move, str
         return status;
     jobs_drop_blob(jobs, garbage);
     jobs_notify(jobs, move->job_id);
-    nudge(jobs);
+    jobs_nudge(jobs);
     return GROOM_OK;
 }
 
@@ -161,7 +183,7 @@ groom_status jobs_submit(struct jobs *jobs, const struct jobs_request *request, 
         return groom_fail(diag, status, "a job could not be made");
     if ((status = store_job_create(jobs->store, &row, present, created, diag)) != GROOM_OK)
         return status;
-    nudge(jobs);
+    jobs_nudge(jobs);
     return store_job_get(jobs->store, present, job, diag);
 }
 
@@ -188,7 +210,7 @@ groom_status jobs_cancel(struct jobs *jobs, const char *id, struct store_job *jo
             struct store_job_move move = {.job_id = id, .from = state, .to = STORE_JOB_CANCELLED};
             status = jobs_move(jobs, &move, diag);
         } else if (state == STORE_JOB_RUNNING) {
-            nudge(jobs);
+            jobs_nudge(jobs);
         }
     } while (status == GROOM_ECONFLICT);
     return status == GROOM_OK ? store_job_get(jobs->store, id, job, diag) : status;

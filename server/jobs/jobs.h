@@ -17,6 +17,9 @@ struct jobs;
 GROOM_MUST_CHECK groom_status jobs_create(struct store *store, struct blobs *blobs, struct jobs **jobs,
                                           struct groom_diag *diag);
 void jobs_destroy(struct jobs *jobs); /* takes NULL; no watch may be left */
+/* Workers see the folder of blobs at this path and may read there what they would else be sent.
+ * Before the supervisor starts. */
+void jobs_share_blobs(struct jobs *jobs, const char *folder);
 
 /* What the HTTP side has checked and filled in. */
 struct jobs_request {
@@ -48,6 +51,9 @@ GROOM_MUST_CHECK groom_status jobs_events_since(struct jobs *jobs, const char *i
 
 /* Remove the blobs that no row refers to; a running daemon may call it any time. */
 GROOM_MUST_CHECK groom_status jobs_collect_blobs(struct jobs *jobs, uint64_t *n_removed, struct groom_diag *diag);
+
+/* Is "job_….2" an attempt of a job of ours that no longer runs? user: the struct jobs. */
+bool jobs_attempt_is_stale(void *user, const char *name);
 
 /* --- waiting without blocking ------------------------------------------------------------ */
 

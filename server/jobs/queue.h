@@ -16,6 +16,7 @@ struct jobs_watch {
 struct jobs {
     struct store *store;
     struct blobs *blobs;
+    char shared_blobs[1024];      /* where workers see the folder of blobs; "": they do not */
     pthread_mutex_t lock;         /* of what follows; never held while the store is asked */
     struct jobs_watch *watches;
     void (*nudge)(void *user);    /* the supervisor's: there is something to see to */
@@ -30,6 +31,8 @@ GROOM_MUST_CHECK groom_status jobs_move(struct jobs *jobs, const struct store_jo
 void jobs_drop_blob(struct jobs *jobs, const char *sha256);
 /* A job has a new event. */
 void jobs_notify(struct jobs *jobs, const char *job_id);
+/* Tell the supervisor that there is something to see to. */
+void jobs_nudge(struct jobs *jobs);
 /* NULL takes it away; when this returns, the former is not running. */
 void jobs_set_nudge(struct jobs *jobs, void (*nudge)(void *user), void *user);
 

@@ -14,7 +14,9 @@
 #include <cjson/cJSON.h>
 
 #include "proto/problem.h"
+#include "proto/work.h"
 #include "server/jobs/queue.h"
+#include "server/jobs/size.h"
 #include "server/jobs/work.h"
 
 #define TAIL_BYTES 2048      /* of a log, as last words */
@@ -31,6 +33,7 @@ struct slot {
     char log_path[PATH_MAX];
     enum stopping stopping;
     int64_t stop_ms;         /* when the next step of stopping is due */
+    bool adopted;            /* a former daemon launched it */
     bool drained;            /* it was stopped by us, not by itself */
     bool ended;              /* the process has; what is left is to say so */
     char words[LAUNCH_HANDLE_SIZE + 384]; /* how it ended */
@@ -48,6 +51,7 @@ struct supervisor {
     struct supervisor_counts counts;
 
     struct slot *slots;      /* the thread's own, and what follows */
+    uint32_t n_places;       /* of the array: n_slots, and room for what was adopted */
     bool look;               /* there may be something to take */
     int64_t take_ms;         /* when a back-off ends; 0: none */
 };
@@ -81,9 +85,29 @@ static void name_log(const struct supervisor *s, struct slot *slot)
              slot->ref.number);
 }
 
-/* How it ended, and the end of what it said; what is not text is made harmless. */
-static void read_last_words(const struct slot *slot, char *words, size_t size)
+/* What its process told the daemon itself: that it ends, and why. returns  whether it did */
+static bool read_own_words(struct supervisor *s, const struct slot *slot, char *words, size_t size)
 {
+    struct store_attempt_list attempts = {0};
+    bool told = false;
+    if (store_attempts_list(s->jobs->store, slot->ref.job_id, &attempts, NULL) != GROOM_OK)
+        return false;
+    for (size_t i = 0; i < attempts.n; i++) {
+        const struct store_attempt *attempt = &attempts.items[i];
+        if (attempt->ref.number != slot->ref.number || attempt->finished_ms == 0)
+            continue;
+        told = true;
+        snprintf(words, size, "%s", attempt->last_words);
+    }
+    store_attempt_list_finish(&attempts);
+    return told;
+}
+
+/* How it ended, and the end of what it said; what is not text is made harmless. */
+static void read_last_words(struct supervisor *s, const struct slot *slot, char *words, size_t size)
+{
+    if (read_own_words(s, slot, words, size))
+        return;
     size_t n = (size_t)snprintf(words, size, "%s", slot->words);
     FILE *log = fopen(slot->log_path, "re");
     if (!log || n + 2 >= size)
@@ -171,12 +195,12 @@ static groom_status move_or_cancel(struct supervisor *s, struct store_job_move *
 static groom_status settle(struct supervisor *s, const struct slot *slot, const struct store_job *job,
                            struct groom_diag *diag)
 {
-    char words[TAIL_BYTES + sizeof slot->words + 2];
+    char words[TAIL_BYTES + WORK_MAX_WORDS + sizeof slot->words + 2];
     char *error = NULL;
     struct store_job_move move = {.job_id = job->id, .from = STORE_JOB_RUNNING, .to = STORE_JOB_QUEUED,
                                   .attempt = slot->ref.number, .attempt_state = STORE_ATTEMPT_STOPPED,
                                   .last_words = words};
-    read_last_words(slot, words, sizeof words);
+    read_last_words(s, slot, words, sizeof words);
     if (job->cancel_requested) {
         move.to = STORE_JOB_CANCELLED;
         move.attempt_state = STORE_ATTEMPT_CANCELLED;
@@ -246,10 +270,19 @@ static void go_on_stopping(struct supervisor *s, struct slot *slot, uint32_t gra
     slot->stop_ms = now_ms() + grace_ms;
 }
 
-/* Something was said of jobs: is one of ours to be cancelled, or over? */
+/* A launcher that lives on elsewhere learns late how a process ended; the process has been quicker. */
+static bool says_it_ends(struct supervisor *s, const struct slot *slot)
+{
+    char words[WORK_MAX_WORDS + 1];
+    return s->options.launcher->table->handle_of && read_own_words(s, slot, words, sizeof words);
+}
+
+/* Something was said of jobs: is one of ours to be cancelled, or over? Its place is free once the
+ * launcher says that it is gone. */
 static void review_slot(struct supervisor *s, struct slot *slot)
 {
     struct store_job job = {0};
+    struct groom_diag diag = {0};
     uint32_t grace = s->options.cancel_grace_ms;
     if (store_job_get(s->jobs->store, slot->ref.job_id, &job, NULL) != GROOM_OK)
         return;
@@ -257,13 +290,15 @@ static void review_slot(struct supervisor *s, struct slot *slot)
         begin_stopping(slot, now_ms() + EXIT_PATIENCE * (int64_t)grace);
     else if (job.cancel_requested)
         begin_stopping(slot, now_ms() + grace);
+    if (runs_this(&job, &slot->ref) && says_it_ends(s, slot) && settle(s, slot, &job, &diag) != GROOM_OK)
+        complain("an attempt's end could not be written", &diag);
     store_job_finish(&job);
 }
 
 static void poll_slot(struct supervisor *s, struct slot *slot)
 {
     struct launcher *launcher = s->options.launcher;
-    struct launch_status status = {LAUNCH_RUNNING, ""};
+    struct launch_status status = {.state = LAUNCH_RUNNING};
     struct groom_diag diag = {0};
     if (launcher->table->poll(launcher, slot->handle, &status, &diag) != GROOM_OK) {
         complain("a worker could not be asked after", &diag);
@@ -271,6 +306,7 @@ static void poll_slot(struct supervisor *s, struct slot *slot)
     }
     if (status.state == LAUNCH_ENDED) {
         slot->ended = true;
+        slot->drained |= slot->adopted && status.unknown; /* nobody knows whose fault that was */
         snprintf(slot->words, sizeof slot->words, "%s", status.words);
     }
 }
@@ -279,9 +315,22 @@ static void poll_slot(struct supervisor *s, struct slot *slot)
 
 #define MAX_ENV 64
 
+/* What was said of all attempts, and of this job where nothing was. */
+static struct launch_size choose_size(struct supervisor *s, const char *job_id)
+{
+    struct launch_size size = s->options.size, estimate = size_of_job(s->jobs, job_id);
+    if (!size.threads)
+        size.threads = estimate.threads;
+    if (!size.memory_bytes)
+        size.memory_bytes = estimate.memory_bytes;
+    if (!size.wall_s)
+        size.wall_s = estimate.wall_s;
+    return size;
+}
+
 static groom_status launch(struct supervisor *s, struct slot *slot, const char *token, struct groom_diag *diag)
 {
-    char url[512], secret[WORK_TOKEN_SIZE + 32], name[STORE_ID_SIZE + 16];
+    char url[1200], secret[WORK_TOKEN_SIZE + 32], name[STORE_ID_SIZE + 16], threads[48];
     const char *env[MAX_ENV + 1];
     size_t n = 0;
     snprintf(url, sizeof url, "GROOM_WORK_URL=%s", s->options.work_url);
@@ -289,11 +338,16 @@ static groom_status launch(struct supervisor *s, struct slot *slot, const char *
     snprintf(name, sizeof name, "%s.%u", slot->ref.job_id, slot->ref.number);
     env[n++] = url;
     env[n++] = secret;
+    struct launch_size size = choose_size(s, slot->ref.job_id);
+    if (s->options.launcher->table->handle_of) { /* it asks for what the job needs, wherever that is */
+        snprintf(threads, sizeof threads, WORK_ENV_THREADS "=%u", size.threads);
+        env[n++] = threads;
+    }
     for (const char *const *more = s->options.worker_env; more && *more && n < MAX_ENV; more++)
         env[n++] = *more;
     env[n] = NULL;
     struct launch_spec spec = {.argv = s->options.worker_argv, .env = env, .name = name,
-                               .log_path = slot->log_path, .limits = s->options.limits};
+                               .log_path = slot->log_path, .limits = s->options.limits, .size = size};
     return s->options.launcher->table->start(s->options.launcher, &spec, slot->handle, diag);
 }
 
@@ -342,9 +396,16 @@ static void fill_slots(struct supervisor *s)
 {
     if (s->take_ms > 0 && store_now_ms() >= s->take_ms)
         s->look = true;
-    for (uint32_t i = 0; s->look && i < s->options.n_slots; i++)
-        if (!s->slots[i].used && !fill_slot(s, &s->slots[i]))
+    uint32_t n_used = 0;
+    for (uint32_t i = 0; i < s->n_places; i++)
+        n_used += s->slots[i].used;
+    for (uint32_t i = 0; s->look && n_used < s->options.n_slots && i < s->n_places; i++) {
+        if (s->slots[i].used)
+            continue;
+        if (!fill_slot(s, &s->slots[i]))
             return;
+        n_used++;
+    }
 }
 
 /* --- the thread ------------------------------------------------------------------------------------ */
@@ -353,6 +414,11 @@ static void see_to_slot(struct supervisor *s, struct slot *slot, bool nudged, bo
 {
     if (nudged && !slot->ended)
         review_slot(s, slot);
+    if (draining && !slot->ended && s->options.launcher->table->handle_of) {
+        slot->used = false; /* it goes on without us, and the next daemon finds it */
+        count(s, -1, 0, 0);
+        return;
+    }
     if (draining && !slot->drained) {
         slot->drained = true;
         slot->stopping = NOT_STOPPING; /* now, whatever was planned */
@@ -402,12 +468,12 @@ static void *supervise(void *user)
         bool running = false;
         s->look |= nudged;
         uint32_t grace_ms = draining ? s->drain_grace_ms : s->options.cancel_grace_ms;
-        for (uint32_t i = 0; i < s->options.n_slots; i++)
+        for (uint32_t i = 0; i < s->n_places; i++)
             if (s->slots[i].used)
                 see_to_slot(s, &s->slots[i], nudged, draining, grace_ms);
         if (!draining)
             fill_slots(s);
-        for (uint32_t i = 0; i < s->options.n_slots; i++) {
+        for (uint32_t i = 0; i < s->n_places; i++) {
             /* drained and not to be written: the next start of the daemon says it */
             if (draining && s->slots[i].ended)
                 s->slots[i].used = false;
@@ -434,7 +500,7 @@ static void nudge_supervisor(void *user)
 static void end_former(struct supervisor *s, const char *handle)
 {
     struct launcher *launcher = s->options.launcher;
-    struct launch_status status = {LAUNCH_RUNNING, ""};
+    struct launch_status status = {.state = LAUNCH_RUNNING};
     struct timespec nap = {0, 10 * 1000000};
     if (launcher->table->stop(launcher, handle, LAUNCH_KILL, NULL) != GROOM_OK)
         return;
@@ -445,24 +511,52 @@ static void end_former(struct supervisor *s, const char *handle)
     }
 }
 
-/* What the store says is running is not: its daemon has ended. Fenced from here on, a worker that were
- * still alive could not hand anything in. */
+/* Its daemon has ended, and it with it. Fenced from here on, a worker that were still alive could not
+ * hand anything in. */
+static groom_status give_back(struct supervisor *s, const struct store_attempt *attempt, struct groom_diag *diag)
+{
+    struct store_job_move move = {.job_id = attempt->ref.job_id, .from = STORE_JOB_RUNNING, .to = STORE_JOB_QUEUED,
+                                  .attempt = attempt->ref.number, .attempt_state = STORE_ATTEMPT_STOPPED,
+                                  .last_words = "the daemon ended"};
+    struct slot slot = {.ref = attempt->ref};
+    end_former(s, attempt->handle);
+    name_log(s, &slot);
+    unlink(slot.log_path);
+    return move_or_cancel(s, &move, diag);
+}
+
+static bool is_handle_of(const struct supervisor *s, const struct store_attempt *attempt)
+{
+    size_t n = strlen(s->options.launcher->table->name);
+    return !strncmp(attempt->handle, s->options.launcher->table->name, n) && attempt->handle[n] == ':';
+}
+
+/* It may run on, or wait to; the daemon may have ended before it noted the handle. */
+static void adopt(struct supervisor *s, const struct store_attempt *attempt, struct slot *slot)
+{
+    char name[STORE_ID_SIZE + 16];
+    *slot = (struct slot){.used = true, .ref = attempt->ref, .adopted = true};
+    snprintf(name, sizeof name, "%s.%u", attempt->ref.job_id, attempt->ref.number);
+    s->options.launcher->table->handle_of(name, slot->handle);
+    name_log(s, slot);
+    count(s, 1, 0, 0);
+}
+
+/* What the store says is running: a launcher that outlives the daemon may still have it. */
 static groom_status recover(struct supervisor *s, struct groom_diag *diag)
 {
     struct store_attempt_list attempts = {0};
+    bool lives_on = s->options.launcher->table->handle_of != NULL;
     groom_status status = store_attempts_list(s->jobs->store, NULL, &attempts, diag);
-    for (size_t i = 0; status == GROOM_OK && i < attempts.n; i++) {
-        const struct store_attempt *attempt = &attempts.items[i];
-        struct store_job_move move = {.job_id = attempt->ref.job_id, .from = STORE_JOB_RUNNING,
-                                      .to = STORE_JOB_QUEUED, .attempt = attempt->ref.number,
-                                      .attempt_state = STORE_ATTEMPT_STOPPED,
-                                      .last_words = "the daemon ended"};
-        struct slot slot = {.ref = attempt->ref};
-        end_former(s, attempt->handle);
-        name_log(s, &slot);
-        unlink(slot.log_path);
-        status = move_or_cancel(s, &move, diag);
-    }
+    s->n_places = s->options.n_slots + (lives_on && status == GROOM_OK ? (uint32_t)attempts.n : 0);
+    if (status == GROOM_OK && !(s->slots = calloc(s->n_places, sizeof *s->slots)))
+        status = groom_fail(diag, GROOM_ENOMEM, "no memory for the supervisor");
+    for (size_t i = 0; status == GROOM_OK && i < attempts.n; i++)
+        /* one of another launcher's is nobody's any more */
+        if (lives_on && (!attempts.items[i].handle[0] || is_handle_of(s, &attempts.items[i])))
+            adopt(s, &attempts.items[i], &s->slots[i]);
+        else
+            status = give_back(s, &attempts.items[i], diag);
     store_attempt_list_finish(&attempts);
     return status;
 }
@@ -515,11 +609,7 @@ groom_status supervisor_start(struct jobs *jobs, const struct supervisor_options
     pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     pthread_cond_init(&s->wake, &monotonic);
     pthread_condattr_destroy(&monotonic);
-    groom_status status;
-    if (!(s->slots = calloc(s->options.n_slots, sizeof *s->slots)))
-        status = groom_fail(diag, GROOM_ENOMEM, "no memory for the supervisor");
-    else
-        status = start_thread(s, diag);
+    groom_status status = start_thread(s, diag);
     if (status != GROOM_OK) {
         supervisor_destroy(s);
         return status;

@@ -7,6 +7,9 @@
  * "attempts":[{"attempt","state","started_at","last_words"},…]). A job that is to be cancelled: the worker hears it with its next
  * report, gets SIGTERM after a second and SIGKILL after another.
  *
+ * Where the launcher's processes outlive the daemon (a cluster), draining leaves them alone and the next
+ * daemon takes them up again by their names; a process that ends says so itself (POST /v1/work/ended).
+ *
  * The thread that launches is the one that lives as long as the workers do: local workers are told by
  * the kernel to die with it (PR_SET_PDEATHSIG is per thread). */
 #ifndef JOBS_SUPERVISOR_H
@@ -29,9 +32,11 @@ struct supervisor_options {
     const char *work_url;           /* "http://127.0.0.1:PORT"; borrowed */
     const char *log_folder;         /* stderr of attempts: <log_folder>/<job>.<attempt>.log; is made */
     struct launch_limits limits;    /* of each attempt */
+    struct launch_size size;        /* of each attempt; what is 0 there is estimated from its job */
 };
 
-/* End what a former daemon left running (its jobs go on from their checkpoints), then start the thread.
+/* End what a former daemon left running (its jobs go on from their checkpoints), or take it up where the
+ * launcher outlives the daemon; then start the thread.
  * options are copied; what they point to must outlive the supervisor. */
 GROOM_MUST_CHECK groom_status supervisor_start(struct jobs *jobs, const struct supervisor_options *options,
                                                struct supervisor **supervisor, struct groom_diag *diag);

@@ -36,13 +36,29 @@ groom_status work_token_make(char token[WORK_TOKEN_SIZE], char hash[STORE_HASH_S
     return GROOM_OK;
 }
 
+/* ".3" behind a token; 0 where there is nothing, or something else (which then opens nothing). */
+static uint32_t read_run(const char *text)
+{
+    char *end;
+    unsigned long run = text[0] == '.' && text[1] >= '0' && text[1] <= '9' ? strtoul(text + 1, &end, 10) : 0;
+    return run > 0 && run < UINT32_MAX && *end == 0 ? (uint32_t)run : 0;
+}
+
 /* Found by its hash: how long the search takes says nothing of the token. */
 groom_status work_authenticate(struct jobs *jobs, const char *token, struct store_attempt_ref *ref,
                                struct groom_diag *diag)
 {
     char hash[STORE_HASH_SIZE];
-    work_hash(token, strlen(token), hash);
-    return store_attempt_find(jobs->store, hash, ref, diag);
+    size_t n = strcspn(token, ".");
+    uint32_t run = read_run(token + n);
+    work_hash(token, run ? n : strlen(token), hash);
+    return store_attempt_find(jobs->store, hash, run, ref, diag);
+}
+
+/* The first run has nothing to fence off. */
+groom_status work_begin(struct jobs *jobs, const struct store_attempt_ref *ref, struct groom_diag *diag)
+{
+    return ref->run > 0 ? store_attempt_begin_run(jobs->store, ref, diag) : GROOM_OK;
 }
 
 /* --- what is to be done ------------------------------------------------------------------ */
@@ -62,7 +78,17 @@ static groom_status read_input(struct jobs *jobs, const cJSON *request, size_t i
     return *found ? store_asset_get(jobs->store, inputs[i].kind, id->valuestring, asset, diag) : GROOM_OK;
 }
 
-static void add_input(cJSON *object, const char *name, const struct store_asset *asset)
+/* Where the workers see the blob, if they do. */
+static void add_path(struct jobs *jobs, cJSON *object, const char *sha256)
+{
+    char path[1024];
+    if (!jobs->shared_blobs[0])
+        return;
+    snprintf(path, sizeof path, "%.900s/%.2s/%s", jobs->shared_blobs, sha256, sha256);
+    cJSON_AddStringToObject(object, "path", path);
+}
+
+static void add_input(struct jobs *jobs, cJSON *object, const char *name, const struct store_asset *asset)
 {
     char up[2] = {asset->up, 0};
     cJSON *input = cJSON_AddObjectToObject(object, name);
@@ -73,6 +99,7 @@ static void add_input(cJSON *object, const char *name, const struct store_asset 
     cJSON_AddNumberToObject(input, "unit_m", asset->unit_m);
     cJSON_AddStringToObject(input, "up", up);
     cJSON_AddStringToObject(input, "name", asset->name);
+    add_path(jobs, input, asset->sha256);
 }
 
 static groom_status add_inputs(struct jobs *jobs, const cJSON *request, cJSON *object, struct groom_diag *diag)
@@ -84,7 +111,7 @@ static groom_status add_inputs(struct jobs *jobs, const cJSON *request, cJSON *o
         if (status != GROOM_OK)
             return status;
         if (found)
-            add_input(object, inputs[i].name, &asset);
+            add_input(jobs, object, inputs[i].name, &asset);
         store_asset_finish(&asset);
     }
     return GROOM_OK;
@@ -104,6 +131,7 @@ static groom_status add_checkpoint(struct jobs *jobs, const char *job_id, cJSON 
     cJSON_AddStringToObject(item, "sha256", checkpoint.sha256);
     cJSON_AddNumberToObject(item, "bytes", (double)checkpoint.n_bytes);
     cJSON_AddNumberToObject(item, "stage", checkpoint.stage);
+    add_path(jobs, item, checkpoint.sha256);
     return GROOM_OK;
 }
 
@@ -232,5 +260,20 @@ groom_status work_failed(struct jobs *jobs, const struct store_attempt_ref *ref,
                                   .error = problem};
     status = jobs_move(jobs, &move, diag);
     cJSON_free(problem);
+    return status;
+}
+
+groom_status work_ended(struct jobs *jobs, const struct store_attempt_ref *ref, const char *body, size_t n_body,
+                        struct groom_diag *diag)
+{
+    cJSON *json = cJSON_ParseWithLength(body, n_body);
+    const char *words = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(json, "words"));
+    groom_status status = words && strlen(words) <= WORK_MAX_WORDS
+                              ? store_attempt_ended(jobs->store, ref, words, diag)
+                              : groom_fail_field(diag, GROOM_EINVAL, "/words",
+                                                 "words are a string of at most %d bytes", WORK_MAX_WORDS);
+    cJSON_Delete(json);
+    if (status == GROOM_OK)
+        jobs_nudge(jobs);
     return status;
 }

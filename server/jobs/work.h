@@ -3,12 +3,13 @@
  * A worker is launched with GROOM_WORK_URL and GROOM_WORK_TOKEN and speaks HTTP with
  * `Authorization: Bearer <token>`; the HTTP side authenticates and calls these:
  *
- *   GET  /v1/work/job                what is to be done                       work_describe
+ *   GET  /v1/work/job                what is to be done                       work_begin, work_describe
  *   GET  /v1/work/blobs/{sha256}     an input, or the checkpoint              work_may_read, blobs_read
  *   POST /v1/work/progress           where it stands; answers {"cancel":b}    work_progress
  *   PUT  /v1/work/checkpoint?stage=N bytes to go on from                      blobs_…, work_checkpoint
  *   POST /v1/work/result             the groom                                work_result
  *   POST /v1/work/failed             a problem object: it cannot be done      work_failed
+ *   POST /v1/work/ended              {"words"}: the process ends without one  work_ended
  *
  * Every call is fenced: once the attempt has ended or another has begun it is refused with
  * GROOM_ECONFLICT, and nothing is written. The worker then exits.
@@ -19,19 +20,25 @@
 #include "server/jobs/jobs.h"
 
 #define WORK_TOKEN_SIZE 65 /* 64 hexadecimal digits */
+#define WORK_MAX_WORDS  4096
 
 /* A one-time token of 256 random bits and the hash under which the store knows it. */
 GROOM_MUST_CHECK groom_status work_token_make(char token[WORK_TOKEN_SIZE], char hash[STORE_HASH_SIZE]);
 /* SHA-256 of any bytes, in hexadecimal. */
 void work_hash(const void *bytes, size_t n_bytes, char hash[STORE_HASH_SIZE]);
 
-/* returns  GROOM_ENOTFOUND (no such token: HTTP 401), GROOM_ECONFLICT (fenced: 409) */
+/* token    as it was sent: "<token>", or "<token>.<run>" of an attempt that a cluster started again
+ * returns  GROOM_ENOTFOUND (no such token: HTTP 401), GROOM_ECONFLICT (fenced: 409) */
 GROOM_MUST_CHECK groom_status work_authenticate(struct jobs *jobs, const char *token,
                                                 struct store_attempt_ref *ref, struct groom_diag *diag);
 
+/* A run of the attempt begins to work: those before it are fenced off. returns  GROOM_ECONFLICT */
+GROOM_MUST_CHECK groom_status work_begin(struct jobs *jobs, const struct store_attempt_ref *ref,
+                                         struct groom_diag *diag);
 /* {"job","kind","attempt","options":{…},"request":{…},
- *  "inputs":{"strands":{"id","sha256","bytes","format","unit_m","up","name"},"head":{…}},
- *  "checkpoint":{"sha256","bytes","stage"} or null}
+ *  "inputs":{"strands":{"id","sha256","bytes","format","unit_m","up","name"[,"path"]},"head":{…}},
+ *  "checkpoint":{"sha256","bytes","stage"[,"path"]} or null}
+ * with the paths where jobs_share_blobs said that workers see the folder of blobs.
  * *text is malloc'ed. */
 GROOM_MUST_CHECK groom_status work_describe(struct jobs *jobs, const struct store_attempt_ref *ref, char **text,
                                             struct groom_diag *diag);
@@ -59,5 +66,9 @@ GROOM_MUST_CHECK groom_status work_result(struct jobs *jobs, const struct store_
  *          GROOM_ECANCELLED (it was told to stop: it has only to exit) */
 GROOM_MUST_CHECK groom_status work_failed(struct jobs *jobs, const struct store_attempt_ref *ref,
                                           const char *body, size_t n_body, struct groom_diag *diag);
+/* The process ends without a result: {"words":"…"}, what it said last. The supervisor hears it before
+ * the launcher may know. returns  GROOM_EINVAL, GROOM_ECONFLICT */
+GROOM_MUST_CHECK groom_status work_ended(struct jobs *jobs, const struct store_attempt_ref *ref,
+                                         const char *body, size_t n_body, struct groom_diag *diag);
 
 #endif

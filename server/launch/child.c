@@ -69,7 +69,7 @@ static groom_status run_begin(struct run *run, struct groom_diag *diag)
         (spec->stdout_fd < 0 && !make_pipe(&run->output_fd, &output_fd))) {
         status = groom_fail(diag, GROOM_EIO, "starting %s: %s", spec->argv[0], strerror(errno));
     } else {
-        struct spawn_spec spawn = {.argv = spec->argv, .limits = spec->limits,
+        struct spawn_spec spawn = {.argv = spec->argv, .env = spec->env, .limits = spec->limits,
                                    .fd = {spec->stdin_fd < 0 ? null_fd : spec->stdin_fd,
                                           spec->stdout_fd < 0 ? output_fd : spec->stdout_fd, words_fd}};
         status = spawn_process(&spawn, &run->pid, diag);
@@ -157,13 +157,16 @@ static void drain(struct run *run, int *fd, void (*keep)(struct run *run, const 
 static void listen_once(struct run *run)
 {
     struct pollfd ends[3] = {{run->pid_fd, POLLIN, 0}, {run->words_fd, POLLIN, 0}, {run->output_fd, POLLIN, 0}};
-    int64_t left = run->deadline_ms - now_ms();
+    const atomic_bool *give_up = run->spec->give_up;
+    int64_t left = give_up && atomic_load(give_up) ? 0 : run->deadline_ms - now_ms();
     if (left <= 0 && !run->result.timed_out) {
         run->result.timed_out = true;
         stop(run);
     }
     /* killed, or without a pidfd: look again soon */
     int timeout = left <= 0 || run->pid_fd < 0 ? 20 : (int)(left < 60000 ? left : 60000);
+    if (give_up && timeout > 100)
+        timeout = 100;
     poll(ends, 3, timeout);
     drain(run, &run->words_fd, keep_words);
     drain(run, &run->output_fd, keep_output);

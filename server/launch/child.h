@@ -1,13 +1,14 @@
 /* Run a tool to its end: how untrusted bytes are parsed, outside the daemon.
  *
- * The child gets standard input and output and nothing else: an empty environment, no other
- * descriptor, a process group of its own, resource limits, a wall clock. It dies with the calling
+ * The child gets standard input and output and nothing else: an empty environment (unless one is given),
+ * no other descriptor, a process group of its own, resource limits, a wall clock. It dies with the calling
  * thread.
  *
  * threads   any; blocks the caller until the child has ended */
 #ifndef LAUNCH_CHILD_H
 #define LAUNCH_CHILD_H
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -17,11 +18,13 @@
 
 struct child_spec {
     const char *const *argv;      /* NULL-terminated; argv[0] is the program's path */
+    const char *const *env;       /* NULL-terminated "NAME=value"; NULL: empty */
     int stdin_fd;                 /* read from; -1: empty */
     int stdout_fd;                /* written to; -1: captured into memory */
     size_t max_output;            /* of captured output; 0: 1 MiB. More of it is GROOM_ETOOBIG */
     struct launch_limits limits;
     uint32_t wall_ms;             /* 0: 60 000 */
+    const atomic_bool *give_up;   /* true: stop it now, as if its time were up; NULL: never */
 };
 
 struct child_result {

@@ -106,10 +106,9 @@ static groom_status local_start(struct launcher *launcher, const struct launch_s
     return GROOM_OK;
 }
 
-static void say_ended(struct launch_status *status, const char *words)
+static void say_gone(struct launch_status *status)
 {
-    status->state = LAUNCH_ENDED;
-    snprintf(status->words, sizeof status->words, "%s", words);
+    *status = (struct launch_status){LAUNCH_ENDED, true, "gone"};
 }
 
 static groom_status local_poll(struct launcher *launcher, const char *handle, struct launch_status *status,
@@ -118,9 +117,9 @@ static groom_status local_poll(struct launcher *launcher, const char *handle, st
     struct process process;
     char state = 'Z';
     int how;
-    *status = (struct launch_status){LAUNCH_RUNNING, ""};
+    *status = (struct launch_status){.state = LAUNCH_RUNNING};
     if (!read_handle(handle, &process) || (process.start != 0 && !is_there(&process, &state))) {
-        say_ended(status, "gone");
+        say_gone(status);
         return GROOM_OK;
     }
     pid_t waited = waitpid(process.pid, &how, WNOHANG);
@@ -128,7 +127,7 @@ static groom_status local_poll(struct launcher *launcher, const char *handle, st
         status->state = LAUNCH_ENDED;
         spawn_words(how, status->words, sizeof status->words);
     } else if (waited < 0 && errno == ECHILD && state == 'Z') {
-        say_ended(status, "gone"); /* a former daemon's, that nobody has waited for yet */
+        say_gone(status); /* a former daemon's, that nobody has waited for yet */
     }
     return GROOM_OK;
 }
@@ -165,7 +164,8 @@ static groom_status local_stop(struct launcher *launcher, const char *handle, en
 
 static void local_destroy(struct launcher *launcher) { free(launcher); }
 
-static const struct launcher_table local_table = {"local", 20, local_start, local_poll, local_stop, local_destroy};
+static const struct launcher_table local_table = {"local", NULL, 20, local_start, local_poll, local_stop,
+                                                  local_destroy};
 
 groom_status launch_local_create(struct launcher **launcher, struct groom_diag *diag)
 {

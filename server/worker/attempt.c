@@ -21,6 +21,7 @@ static volatile sig_atomic_t stop;
 static void on_signal(int number) { stop = number; }
 
 struct attempt {
+    int watched;
     struct work_link link;
     struct order order;
     struct groom_context context;
@@ -210,6 +211,8 @@ static int leave(struct attempt *a)
     a->link.closing = 1;
     if (stop && a->fit && checkpoints_save(&a->checkpoints, a->fit, 1, &a->link, &ignored) != GROOM_OK)
         fprintf(stderr, "groom-worker: the last checkpoint was not taken\n");
+    if (a->watched && a->report.cancelled) /* it need not wait for the cluster to notice */
+        work_link_farewell(&a->link, a->link.why);
     fprintf(stderr, "groom-worker: stopped: %s\n", stop ? "asked to, by a signal" : a->link.why);
     return WORK_EXIT_STOPPED;
 }
@@ -258,13 +261,14 @@ static groom_status run(struct attempt *a)
     return st;
 }
 
-static int attempt(const char *url, const char *token)
+static int attempt(const char *url, const char *token, int watched)
 {
     struct attempt *a = calloc(1, sizeof *a);
     if (!a || !work_link_open(&a->link, url, token, &stop)) {
         free(a);
         return WORK_EXIT_STOPPED;
     }
+    a->watched = watched;
     progress_report_init(&a->report, &a->link);
     a->context.progress = &a->report.callbacks;
     groom_status st = groom_pool_create(worker_threads(), &a->context.pool);
@@ -279,13 +283,16 @@ int worker_attempt(int argc, char **argv)
 {
     const char *url = getenv(WORK_ENV_URL), *token = getenv(WORK_ENV_TOKEN);
     struct sigaction action = {.sa_handler = on_signal};
-    if (argc != 1 || !url || !token) {
-        fputs("groom-worker attempt: takes no argument; " WORK_ENV_URL " and " WORK_ENV_TOKEN
+    int watched = argc == 2 && !strcmp(argv[1], "--watched"), status;
+    if (argc != 1 + watched || !url || !token) {
+        fputs("groom-worker attempt: takes no argument but --watched; " WORK_ENV_URL " and " WORK_ENV_TOKEN
               " name the work. groomd starts it.\n",
               stderr);
         return WORK_EXIT_USAGE;
     }
     sigaction(SIGTERM, &action, NULL);
     sigaction(SIGINT, &action, NULL);
-    return attempt(url, token);
+    if (watched && worker_watch(url, token, &status))
+        return status;
+    return attempt(url, token, watched);
 }

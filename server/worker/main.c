@@ -20,7 +20,9 @@ static const struct command {
     {"render", worker_render,
      "[--unit U] [--up y|z] [--head FILE] [--head-unit U] [--head-up y|z] [--view V] [--size N]\n"
      "                 strands on standard input; a picture of them, as PNG, on standard output"},
-    {"attempt", worker_attempt, "one attempt of a job, as GROOM_WORK_URL and GROOM_WORK_TOKEN name it"},
+    {"attempt", worker_attempt,
+     "[--watched] one attempt of a job, as GROOM_WORK_URL and GROOM_WORK_TOKEN name it; watched by a second\n"
+     "                 process that tells the daemon how it died, where the launcher cannot"},
 };
 enum { N_COMMANDS = sizeof commands / sizeof commands[0] };
 

@@ -86,6 +86,7 @@ static groom_status post(struct progress_report *report, const char *text)
         report->n_losses = 0;
     if (st == GROOM_OK && says_cancel(&response)) {
         snprintf(report->link->why, sizeof report->link->why, "the job is cancelled");
+        report->cancelled = 1;
         st = GROOM_ECANCELLED;
     }
     http_response_finish(&response);

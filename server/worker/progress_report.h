@@ -13,6 +13,7 @@ struct progress_report {
     double first_fraction, started_s;  /* of this attempt: what the time left is reckoned from */
     double sent_s;
     int halted;                        /* the daemon said cancel, or the line is gone: stop */
+    int cancelled;                     /* the daemon said that the job is */
     struct groom_progress callbacks;   /* for the library's context */
     uint32_t n_losses;
     struct progress_loss { char stage[24], name[24]; uint64_t iteration; double value; } losses[PROGRESS_MAX_LOSSES];

@@ -2,10 +2,12 @@
 
 #include <cjson/cJSON.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
 #include "proto/problem.h"
+#include "proto/work.h"
 #include "server/worker/clock.h"
 
 #define MENTION_TIMEOUT_MS 500
@@ -19,12 +21,24 @@ static int asked_to_stop(void *user)
     return *link->stop && !link->closing;
 }
 
+static double number_of_environment(const char *name, double otherwise)
+{
+    const char *text = getenv(name);
+    return text && text[0] >= '0' && text[0] <= '9' ? strtod(text, NULL) : otherwise;
+}
+
 int work_link_open(struct work_link *link, const char *url, const char *token,
                    const volatile sig_atomic_t *stop)
 {
+    char numbered[320];
     memset(link, 0, sizeof *link);
     link->stop = stop;
-    link->patience_s = 60;
+    link->patience_s = number_of_environment(WORK_ENV_PATIENCE, 60);
+    unsigned run = (unsigned)number_of_environment(WORK_ENV_RUN, 0);
+    if (run > 0) {
+        snprintf(numbered, sizeof numbered, "%.300s.%u", token, run);
+        token = numbered;
+    }
     link->client = http_client_create(&(struct http_client_options){.base_url = url,
                                                                     .token = token,
                                                                     .agent = "groom-worker",
@@ -128,4 +142,22 @@ groom_status work_link_mention(struct work_link *link, const struct http_request
         return judge(link, outcome, response, diag);
     response->status = 0;
     return GROOM_OK;
+}
+
+void work_link_farewell(struct work_link *link, const char *words)
+{
+    cJSON *message = cJSON_CreateObject();
+    cJSON_AddStringToObject(message, "words", words);
+    char *text = cJSON_PrintUnformatted(message);
+    cJSON_Delete(message);
+    struct http_request request = {.method = "POST",
+                                   .path = WORK_PATH_ENDED,
+                                   .content_type = "application/json",
+                                   .body = text,
+                                   .n_body = text ? strlen(text) : 0};
+    link->closing = 1;
+    /* where it does not get through, the launcher says it later */
+    if (text && work_link_call(link, &request, NULL, NULL) != GROOM_OK)
+        fprintf(stderr, "groom-worker: the daemon was not told how it ended\n");
+    free(text);
 }

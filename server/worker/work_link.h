@@ -33,4 +33,7 @@ GROOM_MUST_CHECK groom_status work_link_call(struct work_link *link, const struc
 GROOM_MUST_CHECK groom_status work_link_mention(struct work_link *link, const struct http_request *request,
                                                 struct http_response *response, struct groom_diag *diag);
 
+/* The process ends without a result: its last words, said once; nothing but this follows. */
+void work_link_farewell(struct work_link *link, const char *words);
+
 #endif

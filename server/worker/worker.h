@@ -71,4 +71,10 @@ GROOM_MUST_CHECK groom_status worker_input_text(struct worker_input *input, size
 /* A sink that writes to a file descriptor; a broken pipe is GROOM_ECANCELLED. */
 struct groom_sink worker_fd_sink(const int *fd);
 
+/* For launchers that do not see how a process ends: this process forks. The child returns 0 and does
+ * the work; the parent passes signals on, keeps the end of what the child says on standard error, and
+ * where it dies tells the daemon.
+ * returns  1 in the parent once all is over, with the exit status; 0 in the child, or where it cannot fork */
+int worker_watch(const char *url, const char *token, int *status);
+
 #endif

@@ -53,6 +53,7 @@ test('every operation answers as it is described', async (t) => {
   await get(`/v1/jobs/${job.id}/losses`);
   const failing = await submit(daemon);
   const second = await daemon.attempt();
+  await expect(daemon, 204, 'POST', '/v1/work/ended', { token: second, body: { words: 'going' } });
   await expect(daemon, 204, 'POST', '/v1/work/failed', { token: second, body: { type: '/problems/empty', title: 'nothing', status: 422, detail: 'no strand is left' } });
   await expect(daemon, 200, 'DELETE', `/v1/jobs/${failing.id}`);
 

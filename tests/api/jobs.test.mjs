@@ -174,7 +174,7 @@ test('cancelling stops what runs and forgets what waits', async (t) => {
 
 test('only an attempt may work, and only the present one', async (t) => {
   const daemon = await startIdleDaemon(t);
-  for (const [method, path] of [['GET', 'job'], ['GET', `blobs/${'0'.repeat(64)}`], ['POST', 'progress'], ['PUT', 'checkpoint?stage=1'], ['POST', 'result'], ['POST', 'failed']]) {
+  for (const [method, path] of [['GET', 'job'], ['GET', `blobs/${'0'.repeat(64)}`], ['POST', 'progress'], ['PUT', 'checkpoint?stage=1'], ['POST', 'result'], ['POST', 'failed'], ['POST', 'ended']]) {
     const body = method === 'GET' ? undefined : '{}';
     const options = { body, headers: body ? { 'Content-Type': 'application/json' } : {} };
     const { headers } = await refused(daemon, 401, 'unauthorized', method, `/v1/work/${path}`, options);
@@ -196,5 +196,13 @@ test('only an attempt may work, and only the present one', async (t) => {
   assert.equal(order.attempt, 2);
   assert.equal((await expect(daemon, 200, 'GET', `/v1/work/blobs/${order.checkpoint.sha256}`, { token: second })).text, 'half way');
   await refused(daemon, 400, 'invalid-argument', 'POST', '/v1/work/result', { token: second, body: { format: 'groom/1', unit: 'm' } });
-  await expect(daemon, 204, 'POST', '/v1/work/result', { token: second, body: groom_document() });
+  // a cluster starts the same attempt again: its next run takes over, and the one before is fenced off
+  const run = `${second}.1`;
+  await expect(daemon, 200, 'POST', '/v1/work/progress', { token: second, body: {} });
+  await expect(daemon, 200, 'GET', '/v1/work/job', { token: run });
+  await refused(daemon, 409, 'conflict', 'POST', '/v1/work/progress', { token: second, body: {} });
+  await refused(daemon, 401, 'unauthorized', 'POST', '/v1/work/progress', { token: `${second}.x`, body: {} });
+  await refused(daemon, 400, 'invalid-argument', 'POST', '/v1/work/ended', { token: run, body: {}, problem: { pointer: '/words' } });
+  await expect(daemon, 204, 'POST', '/v1/work/ended', { token: run, body: { words: 'signal 11\nlast words' } });
+  await expect(daemon, 204, 'POST', '/v1/work/result', { token: run, body: groom_document() });
 });

@@ -263,7 +263,7 @@ static groom_status start_shell(struct launcher *launcher, const char *script, c
 
 static struct launch_status wait_end(struct launcher *launcher, const char *handle)
 {
-    struct launch_status status = {LAUNCH_RUNNING, ""};
+    struct launch_status status = {.state = LAUNCH_RUNNING};
     for (int i = 0; i < 3000 && status.state == LAUNCH_RUNNING; i++) {
         ck_ok(launcher->table->poll(launcher, handle, &status, &diag));
         if (status.state == LAUNCH_RUNNING)
