@@ -58,6 +58,13 @@ uint64_t blobs_written(const struct blobs_writer *writer);
 GROOM_MUST_CHECK groom_status blobs_commit(struct blobs_writer *writer, const char *expected,
                                            char sha256[BLOBS_HASH_SIZE], struct groom_diag *diag);
 void blobs_abort(struct blobs_writer *writer); /* takes NULL; nothing stays */
+/* The bytes of a file become a blob, pinned; the file stays (both are one where the file system can link).
+ * Nobody may write to it any more.
+ * returns GROOM_ENOSPC, GROOM_EIO, GROOM_ENOMEM */
+GROOM_MUST_CHECK groom_status blobs_adopt(struct blobs *blobs, const char *path, char sha256[BLOBS_HASH_SIZE],
+                                          struct groom_diag *diag);
+/* Pin a blob that is there. returns GROOM_ENOTFOUND, GROOM_ENOMEM, GROOM_EIO */
+GROOM_MUST_CHECK groom_status blobs_pin(struct blobs *blobs, const char *sha256, struct groom_diag *diag);
 /* The row is written (or will never be). */
 void blobs_unpin(struct blobs *blobs, const char *sha256);
 

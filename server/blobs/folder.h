@@ -29,6 +29,8 @@ void blob_name(const char *sha256, char name[BLOBS_NAME_SIZE]);
 bool pin_add(struct blobs *blobs, const char *sha256); /* false: no memory */
 bool pin_held(const struct blobs *blobs, const char *sha256);
 void pin_drop(struct blobs *blobs, const char *sha256);
+/* A name in the folder of this blob is on the disk when this returns. */
+groom_status sync_folder(struct blobs *blobs, const char *sha256, struct groom_diag *diag);
 /* errno of a failed call as a status. */
 groom_status blobs_fail(struct groom_diag *diag, int error, const char *what);
 

@@ -174,7 +174,7 @@ static groom_status make_visible(struct blobs_writer *writer, const char *sha256
     return status;
 }
 
-static groom_status sync_folder(struct blobs *blobs, const char *sha256, struct groom_diag *diag)
+groom_status sync_folder(struct blobs *blobs, const char *sha256, struct groom_diag *diag)
 {
     char name[3] = {sha256[0], sha256[1], 0};
     groom_status status = GROOM_OK;

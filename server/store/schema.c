@@ -67,7 +67,16 @@ static const char version_1[] =
 /* a cluster may run an attempt more than once */
 static const char version_2[] = "ALTER TABLE attempts ADD COLUMN run INTEGER NOT NULL DEFAULT 0;";
 
-const char *const schema_steps[] = {version_1, version_2};
+/* uploads that come in pieces; until it is used, an upload is a file of its own, then the blob `sha256` */
+static const char version_3[] =
+    "CREATE TABLE uploads ("
+    "  id TEXT NOT NULL PRIMARY KEY, n_bytes INTEGER NOT NULL, n_durable INTEGER NOT NULL DEFAULT 0,"
+    "  sha256 TEXT NOT NULL DEFAULT '', metadata TEXT NOT NULL, created INTEGER NOT NULL,"
+    "  expires INTEGER NOT NULL) STRICT;"
+    "CREATE INDEX uploads_by_hash ON uploads (sha256) WHERE sha256 <> '';"
+    "CREATE INDEX uploads_by_end ON uploads (expires);";
+
+const char *const schema_steps[] = {version_1, version_2, version_3};
 const int schema_version = sizeof schema_steps / sizeof schema_steps[0];
 
 static groom_status read_version(sqlite3 *db, int *version, struct groom_diag *diag)

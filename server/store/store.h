@@ -90,6 +90,43 @@ GROOM_MUST_CHECK groom_status store_assets_list(struct store *store, enum store_
 void store_asset_finish(struct store_asset *asset);
 void store_asset_list_finish(struct store_asset_list *list);
 
+/* --- uploads that come in pieces ------------------------------------------------------------ */
+
+/* An upload under way (server/uploads): a file of its own until it is used, then a blob. */
+struct store_upload {
+    char id[STORE_ID_SIZE];       /* "upl_…" */
+    uint64_t n_bytes;             /* what it is to be */
+    uint64_t n_durable;           /* of them on the disk: what its sender is told */
+    char sha256[STORE_HASH_SIZE]; /* its blob once it was used; "": still a file */
+    char *metadata;               /* Upload-Metadata as it was sent; "" */
+    int64_t created_ms, expires_ms;
+};
+
+struct store_upload_list {
+    struct store_upload *items;
+    size_t n;
+};
+
+GROOM_MUST_CHECK groom_status store_upload_create(struct store *store, const struct store_upload *upload,
+                                                  struct groom_diag *diag);
+/* returns  GROOM_ENOTFOUND, also where it has expired */
+GROOM_MUST_CHECK groom_status store_upload_get(struct store *store, const char *id, struct store_upload *upload,
+                                               struct groom_diag *diag);
+/* At least n_durable bytes are on the disk, and it expires no earlier than that. returns  GROOM_ENOTFOUND */
+GROOM_MUST_CHECK groom_status store_upload_advance(struct store *store, const char *id, uint64_t n_durable,
+                                                   int64_t expires_ms, struct groom_diag *diag);
+/* Its bytes are this blob, which is committed and pinned. returns  GROOM_ENOTFOUND */
+GROOM_MUST_CHECK groom_status store_upload_set_blob(struct store *store, const char *id, const char *sha256,
+                                                    int64_t expires_ms, struct groom_diag *diag);
+/* `garbage` is its blob ("" for none) for the caller to collect. returns  GROOM_ENOTFOUND */
+GROOM_MUST_CHECK groom_status store_upload_remove(struct store *store, const char *id,
+                                                  char garbage[STORE_HASH_SIZE], struct groom_diag *diag);
+/* Those that expire before that time; INT64_MAX: all. */
+GROOM_MUST_CHECK groom_status store_uploads_list(struct store *store, int64_t before_ms,
+                                                 struct store_upload_list *list, struct groom_diag *diag);
+void store_upload_finish(struct store_upload *upload);
+void store_upload_list_finish(struct store_upload_list *list);
+
 /* --- grooms and their revisions ----------------------------------------------------------- */
 
 /* A large array of a document, stored once whatever number of revisions hold it. Documents refer to
