@@ -50,6 +50,8 @@ static const struct option options[] = {
     {"job-time", "SECONDS", SECONDS, AT(job_time_s), "0", 0, 30 * 86400, "processor time of an attempt; 0: no limit"},
     {"job-attempts", "N", COUNT, AT(job_attempts), "3", 1, 100, "attempts of a job that may die before it has failed"},
     {"max-upload", "BYTES", BYTES, AT(max_upload), "4G", 1024, ANY, "largest body of an upload"},
+    {"upload-expiry", "SECONDS", SECONDS, AT(upload_expiry_s), "259200", 60, 365 * 86400,
+     "an upload in pieces that nobody used goes so long after its last byte"},
     {"max-body", "BYTES", BYTES, AT(max_body), "1M", 1024, 1 << 30, "largest body of a control message (JSON)"},
     {"min-free", "BYTES", BYTES, AT(min_free), "256M", 0, ANY, "not ready, and no uploads, below this on the disk"},
     {"export-cache", "BYTES", BYTES, AT(export_cache), "1G", 0, ANY, "disk for exports that may be asked for again"},

@@ -25,7 +25,7 @@ struct config {
     char config[CONFIG_TEXT_SIZE]; /* the configuration file */
     /* counts, bytes, seconds */
     uint64_t workers, worker_threads, worker_memory, job_time_s, job_attempts;
-    uint64_t max_upload, max_body, min_free, export_cache;
+    uint64_t max_upload, upload_expiry_s, max_body, min_free, export_cache;
     uint64_t http_threads, fast_threads, slow_threads, slow_queue;
     uint64_t connections, idle_timeout_s, head_timeout_s, min_rate;
     uint64_t slurm_interval_s;

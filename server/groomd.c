@@ -25,6 +25,7 @@
 #include "server/launch/launch.h"
 #include "server/listen.h"
 #include "server/log.h"
+#include "server/uploads/uploads.h"
 
 #define PATH_SIZE 1400
 
@@ -36,6 +37,7 @@ struct daemon {
     struct listening listening;
     struct blobs *blobs;
     struct store *store;
+    struct uploads *uploads;
     struct jobs *jobs;
     struct groom_pool *pool;
     struct grooms *grooms;
@@ -148,6 +150,17 @@ static groom_status create_launcher(struct daemon *daemon, struct groom_diag *di
 
 /* --- the rooms ------------------------------------------------------------------------------ */
 
+static groom_status open_uploads(struct daemon *daemon, struct groom_diag *diag)
+{
+    char path[PATH_SIZE];
+    snprintf(path, sizeof path, "%s/uploads", daemon->config.data);
+    return uploads_create(&(struct uploads_options){.store = daemon->store,
+                                                    .blobs = daemon->blobs,
+                                                    .folder = path,
+                                                    .expiry_ms = (int64_t)daemon->config.upload_expiry_s * 1000},
+                          &daemon->uploads, diag);
+}
+
 static groom_status open_state(struct daemon *daemon, struct groom_diag *diag)
 {
     char path[PATH_SIZE];
@@ -164,7 +177,7 @@ static groom_status open_state(struct daemon *daemon, struct groom_diag *diag)
     if (n_removed)
         log_message(CONFIG_LOG_INFO, "%llu uploads that were never finished have been removed",
                     (unsigned long long)n_removed);
-    return status;
+    return status == GROOM_OK ? open_uploads(daemon, diag) : status;
 }
 
 static groom_status open_grooms(struct daemon *daemon, struct groom_diag *diag)
@@ -206,6 +219,7 @@ static groom_status start_server(struct daemon *daemon, struct groom_diag *diag)
     daemon->service = (struct service){.config = &daemon->config,
                                        .store = daemon->store,
                                        .blobs = daemon->blobs,
+                                       .uploads = daemon->uploads,
                                        .jobs = daemon->jobs,
                                        .grooms = daemon->grooms,
                                        .supervisor = daemon->supervisor,
@@ -240,6 +254,7 @@ static void finish(struct daemon *daemon)
     grooms_destroy(daemon->grooms);
     groom_pool_destroy(daemon->pool);
     jobs_destroy(daemon->jobs);
+    uploads_destroy(daemon->uploads);
     store_close(daemon->store);
     blobs_close(daemon->blobs);
     if (daemon->listening.fd >= 0)

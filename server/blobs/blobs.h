@@ -50,6 +50,8 @@ GROOM_MUST_CHECK groom_status blobs_begin(struct blobs *blobs, uint64_t n_expect
  * returns GROOM_ENOSPC, GROOM_EIO */
 GROOM_MUST_CHECK groom_status blobs_write(struct blobs_writer *writer, const void *bytes, size_t n,
                                           struct groom_diag *diag);
+/* SHA-256 of the bytes so far. returns  false where memory is out */
+bool blobs_digest(const struct blobs_writer *writer, unsigned char digest[32]);
 uint64_t blobs_written(const struct blobs_writer *writer);
 /* Make it durable and visible, and pin it. The writer is gone, whatever is returned; on failure so is
  * the blob. Bytes that are there already are kept once.

@@ -111,6 +111,14 @@ groom_status blobs_write(struct blobs_writer *writer, const void *bytes, size_t 
     return GROOM_OK;
 }
 
+bool blobs_digest(const struct blobs_writer *writer, unsigned char digest[32])
+{
+    EVP_MD_CTX *copy = EVP_MD_CTX_new();
+    bool done = copy && EVP_MD_CTX_copy_ex(copy, writer->hash) == 1 && EVP_DigestFinal_ex(copy, digest, NULL) == 1;
+    EVP_MD_CTX_free(copy);
+    return done;
+}
+
 uint64_t blobs_written(const struct blobs_writer *writer) { return writer->n_written; }
 
 /* --- the end -------------------------------------------------------------------------------- */

@@ -8,9 +8,11 @@
 #include "groom/mesh.h"
 #include "proto/json_text.h"
 #include "server/blobs/blobs.h"
+#include "server/http/digest.h"
 #include "server/http/handlers.h"
 #include "server/http/tool.h"
 #include "server/store/store.h"
+#include "server/uploads/uploads.h"
 
 /* What differs between the two. */
 struct kind {
@@ -94,7 +96,12 @@ static bool parse_reading(struct request *request, const struct kind *kind, stru
 int assets_check_upload(struct request *request)
 {
     struct reading reading;
-    if (request->n_expected == 0) {
+    const char *upload = request_query(request, "upload");
+    if (upload && request->n_expected > 0) {
+        respond_bad_query(request, "upload", "with upload=%.40s the bytes are there already: send no body", upload);
+        return 0;
+    }
+    if (!upload && request->n_expected == 0) {
         respond_refusal(request, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL),
                         "the body is empty; send the bytes of the file");
         return 0;
@@ -197,6 +204,23 @@ static void take_upload(struct request *request, const struct kind *kind, const 
         forget_blob(request, sha256);
 }
 
+/* From an upload in pieces, which stays until it expires: whoever did not hear the answer asks again. */
+static void post_upload(struct request *request, const struct kind *kind, const struct reading *reading)
+{
+    char sha256[BLOBS_HASH_SIZE];
+    uint64_t n_bytes = 0;
+    enum upload_refusal refusal = UPLOAD_NOT_REFUSED;
+    struct groom_diag diag = {0};
+    groom_status status = uploads_take(request->service->uploads, request_query(request, "upload"), sha256, &n_bytes,
+                                       &refusal, &diag);
+    if (status == GROOM_OK)
+        take_upload(request, kind, reading, sha256, n_bytes);
+    else if (refusal == UPLOAD_BUSY)
+        respond_refusal(request, 423, "locked", "somebody is at it", "%s; try again in a moment", diag.detail);
+    else
+        respond_failure(request, status, &diag);
+}
+
 static void post(struct request *request, const struct kind *kind)
 {
     struct reading reading;
@@ -204,6 +228,10 @@ static void post(struct request *request, const struct kind *kind)
     char sha256[BLOBS_HASH_SIZE];
     if (!parse_reading(request, kind, &reading))
         return;
+    if (request_query(request, "upload")) {
+        post_upload(request, kind, &reading);
+        return;
+    }
     if (request->n_received == 0) {
         respond_refusal(request, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL),
                         "the body is empty; send the bytes of the file");
@@ -267,6 +295,7 @@ static void list(struct request *request, const struct kind *kind)
 
 static void respond_blob(struct request *request, const struct store_asset *asset, groom_format format)
 {
+    char digest[DIGEST_TEXT_SIZE];
     int fd;
     uint64_t n_bytes;
     struct groom_diag diag = {0};
@@ -277,9 +306,13 @@ static void respond_blob(struct request *request, const struct store_asset *asse
     }
     if (format != GROOM_FORMAT_AUTO) {
         tool_respond_file(request, format, asset->id, asset->sha256, fd, n_bytes);
+        digest_text(asset->sha256, digest);
+        respond_header(request, "Repr-Digest", "%s", digest);
         return;
     }
     respond_file(request, "application/octet-stream", fd, n_bytes);
+    digest_text(asset->sha256, digest);
+    respond_header(request, "Repr-Digest", "%s", digest);
     respond_header(request, "Content-Disposition", "attachment; filename=\"%s.%s\"", asset->id,
                    asset->format);
     respond_etag(request, "%s", asset->sha256);

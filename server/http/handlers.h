@@ -29,6 +29,15 @@ void assets_list_heads(struct request *request);
 void assets_get_head(struct request *request);
 void assets_get_head_data(struct request *request);
 
+/* uploads.c: uploads in pieces */
+void uploads_call_options(struct request *request);
+int uploads_check_post(struct request *request);
+void uploads_call_post(struct request *request);
+void uploads_call_get(struct request *request);
+int uploads_check_patch(struct request *request);
+void uploads_call_patch(struct request *request);
+void uploads_call_delete(struct request *request);
+
 /* job_calls.c */
 void jobs_call_post(struct request *request);
 void jobs_call_list(struct request *request);

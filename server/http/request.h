@@ -24,6 +24,7 @@ struct cJSON;
 struct event_feed;
 struct MHD_Connection;
 struct server;
+struct upload_writer;
 
 enum response_kind { RESPONSE_NONE, RESPONSE_BYTES, RESPONSE_FILE, RESPONSE_EVENTS };
 
@@ -61,7 +62,13 @@ struct request {
     size_t n_body;
     int body_fd;               /* BODY_FILE: -1 for none; stands at the end of what was written */
     struct blobs_writer *blob; /* BODY_BLOB: the handler commits it (and sets it to NULL) */
+    struct upload_writer *upload; /* BODY_UPLOAD: the handler finishes it (and sets it to NULL) */
+    char upload_id[STORE_ID_SIZE];
+    int64_t upload_expires_ms;
     uint64_t n_received;
+    bool has_digest; /* digest.h: what Content-Digest says of it */
+    unsigned char digest[32];
+    struct evp_md_ctx_st *hash;
 
     struct store_attempt_ref attempt; /* ROUTE_WORK: who is asking */
     struct response response;

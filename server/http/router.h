@@ -13,7 +13,8 @@ enum body_mode {
     BODY_NONE,   /* refused where there is one */
     BODY_MEMORY, /* request.body, up to --max-body */
     BODY_FILE,   /* request.body_fd, a file without a name, up to --max-upload */
-    BODY_BLOB    /* request.blob, a blob being written and hashed, up to --max-upload */
+    BODY_BLOB,   /* request.blob, a blob being written and hashed, up to --max-upload */
+    BODY_UPLOAD  /* a piece of an upload, into request.upload, which the route's check has opened */
 };
 
 /* Where the handler runs. */
@@ -34,13 +35,15 @@ struct route {
     const char *query; /* query parameters that it knows, blanks between; any other is refused */
     int flags;
     /* NULL, or asked before the body is read: answers and returns false where the request cannot be
-     * right. It must not wait. */
+     * right. It must not wait, unless ROUTE_WAITS. */
     int (*check)(struct request *request);
 };
 
 #define ROUTE_WORK    1 /* asks for the bearer token of an attempt */
 #define ROUTE_QUIET   2 /* logged at level debug: probes and progress */
 #define ROUTE_RESUMES 4 /* its handler calls request_resume when it has the answer */
+#define ROUTE_WAITS   8 /* its check runs in the fast lane and may wait for the database */
+#define ROUTE_TUS     16 /* of the tus protocol: every answer carries Tus-Resumable */
 
 enum router_outcome { ROUTER_FOUND, ROUTER_NO_PATH, ROUTER_NO_METHOD };
 

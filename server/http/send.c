@@ -110,6 +110,8 @@ static void add_headers(struct request *request, struct MHD_Response *sent)
     const struct response *response = &request->response;
     for (size_t i = 0; i < response->n_headers; i++)
         MHD_add_response_header(sent, response->headers[i].name, response->headers[i].value);
+    if (request->route && (request->route->flags & ROUTE_TUS))
+        MHD_add_response_header(sent, "Tus-Resumable", "1.0.0");
     if (response->content_type)
         MHD_add_response_header(sent, "Content-Type", response->content_type);
     if (response->etag[0])

@@ -1,3 +1,4 @@
+#include "server/http/digest.h"
 #include "server/http/events.h"
 #include "server/http/server.h"
 
@@ -18,8 +19,11 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <openssl/evp.h>
+
 #include "server/jobs/work.h"
 #include "server/log.h"
+#include "server/uploads/uploads.h"
 
 /* A refused body up to this size is read and dropped, so that the client hears why: closing a
  * connection with unread bytes resets it. Larger ones are cut. */
@@ -177,10 +181,20 @@ static bool check_origin(struct request *request)
     return false;
 }
 
+/* Some proxies let nothing but POST through: tus has its clients name the real method in a header. */
+static void override_method(struct request *request)
+{
+    const char *method = request_header(request, "X-HTTP-Method-Override");
+    if (method && !strcmp(request->method, "POST") && !strncmp(request->path, "/v1/uploads/", 12) &&
+        (!strcmp(method, "PATCH") || !strcmp(method, "DELETE")))
+        snprintf(request->method, sizeof request->method, "%s", method);
+}
+
 static bool find_route(struct request *request)
 {
     struct server *server = request->server;
     struct router_match match;
+    override_method(request);
     switch (router_find(server->routes, server->n_routes, request->method, &request->uri, &match)) {
     case ROUTER_FOUND:
         request->route = match.route;
@@ -367,10 +381,14 @@ static void take_bytes(struct request *request, const char *bytes, size_t n)
     case BODY_FILE:
         status = keep_in_file(request->body_fd, bytes, n);
         break;
+    case BODY_UPLOAD:
+        status = upload_write(request->upload, bytes, n, &diag);
+        break;
     default:
         status = blobs_write(request->blob, bytes, n, &diag);
         break;
     }
+    digest_update(request, bytes, n);
     if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
         request->discard = true;
@@ -396,9 +414,8 @@ static void run_handler(struct task *task)
 }
 
 /* The bearer token of an attempt, against the store. */
-static void run_check(struct task *task)
+static void check_attempt(struct request *request)
 {
-    struct request *request = (struct request *)task;
     struct groom_diag diag = {0};
     const char *header = request_header(request, "Authorization");
     const char *token = header && !strncasecmp(header, "Bearer ", 7) ? header + 7 : "";
@@ -410,10 +427,21 @@ static void run_check(struct task *task)
     } else if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
     }
-    request_resume(request);
 }
 
 static bool is_answered(const struct request *request) { return request->response.kind != RESPONSE_NONE; }
+
+/* What has to wait before the body is read. */
+static void run_check(struct task *task)
+{
+    struct request *request = (struct request *)task;
+    int flags = request->route->flags;
+    if (flags & ROUTE_WORK)
+        check_attempt(request);
+    if (!is_answered(request) && (flags & ROUTE_WAITS) && !request->route->check(request) && !is_answered(request))
+        respond_failure(request, GROOM_EINTERNAL, NULL);
+    request_resume(request);
+}
 
 static void refuse_busy(struct request *request, const char *why)
 {
@@ -444,7 +472,7 @@ static enum MHD_Result work(struct request *request)
     const struct route *route = request->route;
     request->phase = PHASE_WORKING;
     link_busy(request->link);
-    if (!is_answered(request) && route->lane == LANE_INLINE)
+    if (!is_answered(request) && digest_check(request) && route->lane == LANE_INLINE)
         route->handle(request);
     if (!is_answered(request) &&
         start(request, server_lane(request->server, route->lane), run_handler, false))
@@ -475,7 +503,8 @@ static bool check_head(struct request *request)
 {
     return !is_answered(request) && read_length(request) && check_origin(request) && find_route(request) &&
            check_query(request) && check_media(request) && check_size(request) &&
-           (!request->route->check || request->route->check(request));
+           digest_start(request) &&
+           (!request->route->check || (request->route->flags & ROUTE_WAITS) || request->route->check(request));
 }
 
 static enum MHD_Result on_checked(struct request *request)
@@ -498,7 +527,7 @@ static enum MHD_Result on_head(struct request *request)
     if (!check_head(request))
         return refuse(request);
     request->phase = PHASE_CHECKED;
-    if (request->route->flags & ROUTE_WORK) {
+    if (request->route->flags & (ROUTE_WORK | ROUTE_WAITS)) {
         if (start(request, request->server->fast, run_check, true))
             return MHD_YES;
         return refuse(request);
@@ -635,6 +664,8 @@ static void on_completed(void *user, struct MHD_Connection *connection, void **s
     write_access_log(request, seconds, code);
     link_head(request->link);
     blobs_abort(request->blob);
+    upload_abandon(request->upload);
+    EVP_MD_CTX_free(request->hash);
     if (request->body_fd >= 0)
         close(request->body_fd);
     free(request->body);

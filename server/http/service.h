@@ -9,11 +9,13 @@ struct grooms;
 struct jobs;
 struct store;
 struct supervisor;
+struct uploads;
 
 struct service {
     const struct config *config;
     struct store *store;
     struct blobs *blobs;
+    struct uploads *uploads;
     struct jobs *jobs;
     struct grooms *grooms;
     struct supervisor *supervisor;

@@ -91,6 +91,7 @@ groom_status upload_open(struct uploads *uploads, const char *id, uint64_t offse
         writer_leave(entered);
         return status;
     }
+    writer_ready(entered);
     *writer = entered;
     return GROOM_OK;
 }

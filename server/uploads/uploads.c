@@ -221,9 +221,7 @@ static void see_to_writers(struct uploads *uploads)
     bool ended = false;
     size_t n_seen = 0;
     for (struct upload_writer *writer; (writer = next_writer(uploads, n_seen, &ended));) {
-        groom_status status = writer_settle(writer, NULL);
-        (void)status; /* nothing was acknowledged; the sender is told the offset that the row has */
-        if (ended)
+        if (writer_try_settle(writer) && ended)
             writer_leave(writer);
         else {
             writer_release(writer);

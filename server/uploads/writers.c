@@ -34,6 +34,8 @@ static struct upload_writer *writer_create(struct uploads *uploads, const char *
     atomic_init(&writer->heard_ms, uploads_clock_ms());
     pthread_mutex_init(&writer->settling, NULL);
     pthread_mutex_init(&writer->io, NULL);
+    pthread_mutex_lock(&writer->settling);
+    writer->is_entering = true;
     return writer;
 }
 
@@ -117,6 +119,16 @@ groom_status writer_settle(struct upload_writer *writer, struct groom_diag *diag
     return status;
 }
 
+bool writer_try_settle(struct upload_writer *writer)
+{
+    if (pthread_mutex_trylock(&writer->settling) != 0)
+        return false;
+    groom_status status = settle(writer, NULL);
+    (void)status; /* nothing was acknowledged; the sender is told the offset that the row has */
+    pthread_mutex_unlock(&writer->settling);
+    return true;
+}
+
 /* Its last bytes are made durable, then none of its calls does anything. With `settling` held, so that
  * a settling under way ends before the successor looks how far the upload is. */
 static void put_out(struct upload_writer *writer)
@@ -152,6 +164,7 @@ groom_status writer_enter(struct uploads *uploads, const char *id, bool anyone, 
     }
     pthread_mutex_unlock(&uploads->lock);
     if (refused) {
+        writer_ready(made);
         atomic_store(&made->n_references, 1);
         writer_release(made);
         return groom_fail(diag, GROOM_ECONFLICT, "another request is sending to this upload");
@@ -164,9 +177,17 @@ groom_status writer_enter(struct uploads *uploads, const char *id, bool anyone, 
     return GROOM_OK;
 }
 
+void writer_ready(struct upload_writer *writer)
+{
+    writer->is_entering = false;
+    pthread_mutex_unlock(&writer->settling);
+}
+
 void writer_leave(struct upload_writer *writer)
 {
     struct uploads *uploads = writer->uploads;
+    if (writer->is_entering)
+        writer_ready(writer);
     pthread_mutex_lock(&uploads->lock);
     struct upload_writer **at = place_of(uploads, writer->id);
     bool present = *at == writer;

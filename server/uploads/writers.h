@@ -21,7 +21,8 @@ struct upload_writer {
     EVP_MD_CTX *hash;         /* of a piece with a checksum, else NULL */
     struct upload_checksum checksum;
 
-    pthread_mutex_t settling; /* of making durable */
+    pthread_mutex_t settling; /* of making durable; held from the entry until it is ready */
+    bool is_entering;
     uint64_t n_durable;
     pthread_mutex_t io; /* of what follows */
     uint64_t n_written; /* where the piece ends by now */
@@ -50,10 +51,12 @@ int64_t uploads_clock_ms(void);
 void uploads_path(const struct uploads *uploads, const char *id, char *path, size_t size);
 
 /* Enter the registry as the only one at this upload. Whoever was there and is done, or silent, is settled
- * and put out of office; anyone: whoever it is.
+ * and put out of office; anyone: whoever it is. Until writer_ready (or writer_leave, by the same thread) a
+ * successor waits, so that nobody works on a file that another is still opening or settling.
  * returns  GROOM_ECONFLICT: somebody is at it */
 GROOM_MUST_CHECK groom_status writer_enter(struct uploads *uploads, const char *id, bool anyone,
                                            struct upload_writer **writer, struct groom_diag *diag);
+void writer_ready(struct upload_writer *writer);
 /* Leave it and let go. */
 void writer_leave(struct upload_writer *writer);
 void writer_release(struct upload_writer *writer);
@@ -61,5 +64,7 @@ void writer_release(struct upload_writer *writer);
 struct upload_writer *writer_find(struct uploads *uploads, const char *id);
 /* Bring to the disk what was written, and say so in the row. Nothing to do is fine. */
 GROOM_MUST_CHECK groom_status writer_settle(struct upload_writer *writer, struct groom_diag *diag);
+/* The same where nobody else is settling it or entering: the keeper waits for no one. returns  whether it did */
+bool writer_try_settle(struct upload_writer *writer);
 
 #endif

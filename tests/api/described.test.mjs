@@ -6,7 +6,7 @@ import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { events, expect, groom_document, head_obj, startIdleDaemon, submit, upload, strands_json } from '../support/api.mjs';
+import { events, expect, groom_document, hair, head_obj, startIdleDaemon, submit, upload, strands_json } from '../support/api.mjs';
 import { operations, seen, resolved } from '../support/openapi.mjs';
 
 const here = dirname(fileURLToPath(import.meta.url));
@@ -38,6 +38,15 @@ test('every operation answers as it is described', async (t) => {
     await get(`/v1/${kind}/${id}`);
     await get(`/v1/${kind}/${id}/data`);
   }
+
+  const tus = { 'Tus-Resumable': '1.0.0' }, bytes = hair(3, 4);
+  await expect(daemon, 204, 'OPTIONS', '/v1/uploads');
+  const created = await expect(daemon, 201, 'POST', '/v1/uploads', { headers: { ...tus, 'Upload-Length': `${bytes.length}` } });
+  const sending = created.headers.get('location');
+  await expect(daemon, 204, 'PATCH', sending, { headers: { ...tus, 'Upload-Offset': '0', 'Content-Type': 'application/offset+octet-stream' }, body: bytes });
+  await get(sending);
+  await expect(daemon, 201, 'POST', `/v1/strands?upload=${sending.split('/').pop()}`);
+  await expect(daemon, 204, 'DELETE', sending);
 
   const job = await submit(daemon, { head: head.id });
   const token = await daemon.attempt();
