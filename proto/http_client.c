@@ -174,6 +174,15 @@ static void keep_header(char *out, size_t capacity, const char *line, size_t n, 
     snprintf(out, capacity, "%.*s", (int)(n - length), line + length);
 }
 
+static void keep_number(long long *out, const char *line, size_t n, const char *name)
+{
+    char text[24] = "", *end;
+    keep_header(text, sizeof text, line, n, name);
+    long long value = strtoll(text, &end, 10);
+    if (text[0] && !*end && value >= 0)
+        *out = value;
+}
+
 static size_t on_header(char *line, size_t size, size_t n, void *user)
 {
     struct http_response *r = ((struct transfer *)user)->response;
@@ -185,6 +194,8 @@ static size_t on_header(char *line, size_t size, size_t n, void *user)
     keep_header(seconds, sizeof seconds, line, n, "Retry-After");
     if (seconds[0])
         r->retry_after_s = atoi(seconds);
+    keep_number(&r->upload_offset, line, n, "Upload-Offset");
+    keep_number(&r->upload_length, line, n, "Upload-Length");
     return n;
 }
 
@@ -253,6 +264,7 @@ static int transfer_init(struct transfer *t, struct http_client *client, const s
     memset(t, 0, sizeof *t);
     memset(response, 0, sizeof *response);
     response->retry_after_s = -1;
+    response->upload_offset = response->upload_length = -1;
     t->request = request;
     t->response = response;
     t->code = CURLE_OUT_OF_MEMORY;

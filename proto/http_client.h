@@ -40,6 +40,7 @@ struct http_response {
     size_t n_body;
     char content_type[96], etag[96], location[256]; /* "" where missing */
     int retry_after_s;     /* -1 where missing */
+    long long upload_offset, upload_length; /* of tus; -1 where missing */
     char failure[256];     /* what libcurl says, where not HTTP_ANSWERED */
 };
 void http_response_finish(struct http_response *response); /* takes zeroed values */

@@ -16,7 +16,8 @@ const struct option_spec groomctl_global_options[] = {
     {"up", 0, "A", "its up axis: y or z (y)"},                                                         \
     {"format", 0, "F", "what it is, where its bytes do not tell: hair, monohair, data, ct2hair, ply, " \
                        "tfx, obj, json, npy, npz"},                                                    \
-    {"name", 0, "NAME", "what people call it (the file's name)"}
+    {"name", 0, "NAME", "what people call it (the file's name)"},                                     \
+    {"resumable-from", 0, "BYTES", "files of this size go on where a broken upload ended (16777216)"}
 
 static const struct option_spec upload_options[] = {READ_OPTIONS, {0}};
 

@@ -8,8 +8,9 @@
 /* How a file is to be read; members may be NULL. */
 struct upload_options {
     const char *format, *unit, *up, *name;
+    const char *resumable_from; /* bytes from which on a file is sent so that it can be gone on with */
 };
-/* From --format, --unit, --up and --name. */
+/* From --format, --unit, --up, --name and --resumable-from. */
 struct upload_options upload_options_of(const struct arguments *arguments);
 
 /* Post a file. answer: the resource, the caller's to delete, on DONE. */

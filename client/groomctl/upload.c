@@ -1,13 +1,13 @@
 #include <errno.h>
 #include <fcntl.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
-#include "client/groomctl/progress_bar.h"
+#include "client/groomctl/resumable.h"
 #include "client/groomctl/transfer.h"
 #include "proto/url.h"
 
@@ -16,41 +16,8 @@ struct upload_options upload_options_of(const struct arguments *arguments)
     return (struct upload_options){.format = argument(arguments, "format"),
                                    .unit = argument(arguments, "unit"),
                                    .up = argument(arguments, "up"),
-                                   .name = argument(arguments, "name")};
-}
-
-/* --- the bar ---------------------------------------------------------------------------- */
-
-struct sending {
-    const char *name;
-    double started, drawn;
-    size_t n_lines;
-};
-
-static double now_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
-
-static void on_sent(void *user, uint64_t n_sent, uint64_t n_total)
-{
-    struct sending *s = user;
-    double now = now_s(), elapsed = now - s->started;
-    char lines[1][256], note[48];
-    if (now - s->drawn < 0.1 && n_sent < n_total)
-        return;
-    s->drawn = now;
-    struct progress_line line = {.label = s->name,
-                                 .fraction = n_total ? (double)n_sent / (double)n_total : 1,
-                                 .eta_s = -1,
-                                 .note = note};
-    if (elapsed > 0.5 && n_sent)
-        line.eta_s = elapsed * (double)(n_total - n_sent) / (double)n_sent;
-    snprintf(note, sizeof note, "%.1f MB", (double)n_total * 1e-6);
-    progress_bar_text(&line, progress_columns(), lines[0], sizeof lines[0]);
-    s->n_lines = progress_draw((const char(*)[256])lines, 1, s->n_lines);
+                                   .name = argument(arguments, "name"),
+                                   .resumable_from = argument(arguments, "resumable-from")};
 }
 
 /* --- sending ------------------------------------------------------------------------------ */
@@ -59,6 +26,14 @@ static const char *base_name(const char *path)
 {
     const char *slash = strrchr(path, '/');
     return slash ? slash + 1 : path;
+}
+
+/* Below this a broken upload is sent again sooner than it is asked after. */
+static uint64_t resumable_from(const char *text)
+{
+    char *end;
+    unsigned long long value = text ? strtoull(text, &end, 10) : 0;
+    return text && *text && !*end ? value : (uint64_t)16 << 20;
 }
 
 static int open_input(const char *path, uint64_t *n_bytes)
@@ -83,19 +58,19 @@ static int open_input(const char *path, uint64_t *n_bytes)
 static int send_file(struct groomctl *ctl, const char *url_path, int fd, uint64_t n_bytes, const char *name,
                      cJSON **answer)
 {
-    struct sending sending = {.name = name, .started = now_s()};
+    struct sending sending;
+    sending_init(&sending, name, 0, n_bytes);
     struct http_request request = {.method = "POST",
                                    .path = url_path,
                                    .content_type = "application/octet-stream",
                                    .body_fd = fd,
                                    .n_body = n_bytes,
-                                   .sent = ctl->is_terminal && !ctl->json ? on_sent : NULL,
+                                   .sent = ctl->is_terminal && !ctl->json ? sending_draw : NULL,
                                    .user = &sending,
                                    .idle_timeout_s = 300};
     struct http_response response;
     int status = api_call(ctl, &request, &response);
-    if (sending.n_lines)
-        progress_draw(NULL, 0, sending.n_lines);
+    sending_clear(&sending);
     *answer = status == DONE ? cJSON_ParseWithLength(response.body, response.n_body) : NULL;
     if (status == DONE && !*answer) {
         fputs("groomctl: the server's answer is not JSON; is this a groomd?\n", stderr);
@@ -112,7 +87,7 @@ int upload_file(struct groomctl *ctl, enum sized_thing thing, const char *path,
 {
     struct url url;
     uint64_t n_bytes = 0;
-    int fd = open_input(path, &n_bytes);
+    int fd = open_input(path, &n_bytes), status;
     if (fd < 0)
         return REFUSED;
     url_init(&url, thing == SIZED_HEAD ? "/v1/heads" : "/v1/strands");
@@ -120,8 +95,12 @@ int upload_file(struct groomctl *ctl, enum sized_thing thing, const char *path,
     url_query(&url, "unit", options->unit);
     url_query(&url, "up", options->up);
     url_query(&url, "name", options->name ? options->name : base_name(path));
-    int status = url.overflow ? groomctl_usage_error("upload", "the name is too long")
-                              : send_file(ctl, url.text, fd, n_bytes, base_name(path), answer);
+    bool in_pieces = !url.overflow && n_bytes >= resumable_from(options->resumable_from) &&
+                     upload_resumable(ctl, &url, fd, n_bytes, path, &status, answer);
+    if (url.overflow)
+        status = groomctl_usage_error("upload", "the name is too long");
+    else if (!in_pieces)
+        status = send_file(ctl, url.text, fd, n_bytes, base_name(path), answer);
     close(fd);
     return status;
 }
