@@ -17,6 +17,7 @@ declare -A allowed=(
     [lib/quality]="base geometry strands quality"
     [lib/fit]="base geometry strands model quality fit"
     [lib/curvature]="base geometry strands model curvature"
+    [lib/layers]="base geometry strands model curvature layers"
     [lib/retarget]="base geometry strands model retarget"
     [lib/sample]="base geometry strands model sample"
     [lib/render]="base geometry strands render"
@@ -26,7 +27,7 @@ declare -A room_of_header=(
     [mesh]=geometry [spatial]=geometry [scalp]=geometry [camera]=geometry
     [strands]=strands [format]=strands
     [groom]=model [document]=model [quality]=quality
-    [fit]=fit [sample]=sample [render]=render [curvature]=curvature [analysis]=curvature [retarget]=retarget
+    [fit]=fit [sample]=sample [render]=render [curvature]=curvature [layers]=layers [analysis]=curvature [retarget]=retarget
 )
 
 check_lib_include() { # file room included

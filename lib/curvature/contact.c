@@ -8,7 +8,7 @@
 #include "groom/curvature.h"
 #include "groom/spatial.h"
 
-#define MOST_PUSHES 6
+#define MOST_PUSHES GROOM_CONTACT_MOST_HELD
 
 struct groom_contact_options groom_contact_options_default(void)
 {
@@ -186,6 +186,20 @@ static size_t gather_anchors(const struct contact_job *job, const struct groom_a
     return n;
 }
 
+static void tell_held(const struct contact_job *job)
+{
+    double share = job->options->root_share;
+    for (uint32_t i = 0; i < job->helices->n_strands; i++)
+        for (uint32_t k = 0; k < job->n_pushes[i] && job->options->max_rounds > 0; k++) {
+            struct groom_contact_report *r = &job->reports[i];
+            const struct push *p = &job->pushes[(size_t)i * MOST_PUSHES + k];
+            r->held[k].at = (float)(share + (1.0 - share) * p->station / (job->options->n_samples - 1));
+            for (int c = 0; c < 3; c++)
+                r->held[k].position[c] = (float)p->target[c];
+            r->n_held = k + 1;
+        }
+}
+
 static int job_init(struct contact_job *job, const struct groom_context *context)
 {
     const struct groom_allocator *a = memory_allocator(context);
@@ -283,6 +297,7 @@ groom_status groom_superhelices_push_out(struct groom_superhelices *helices, con
             goto out;
         }
     }
+    tell_held(&job);
     memcpy(reports, job.reports, n * sizeof *reports);
 out:
     job_finish(&job, context);

@@ -430,9 +430,16 @@ struct groom_contact_options {
 /* 32 stations, 4 rounds, the first 5 % spared, 1 mm. */
 struct groom_contact_options groom_contact_options_default(void);
 
+#define GROOM_CONTACT_MOST_HELD 6
+
 struct groom_contact_report {
     uint32_t checked;                    /* 1: this strand had anchors */
     float depth_before_m, depth_after_m; /* how far below the surface at most, beyond where it lay at rest */
+    uint32_t n_held;                     /* the further anchors that this strand got */
+    struct {
+        float at;                        /* 0..1 of its arc length */
+        float position[3];
+    } held[GROOM_CONTACT_MOST_HELD];
 };
 
 /* After a sculpt: strands with anchors that went into the head (a mesh with outward normals) get further
