@@ -4,6 +4,7 @@
 #   make run        a daemon that has fitted the bundled sample, and the address to open
 #   make test       lint, unit, property, fuzz corpus, API and end-to-end tests
 #   make bench      a table of figures, and build/bench.json
+#   make real-captures  fits of real captures: pictures and reports (CAPTURES names their folder)
 #   make asan tsan  the tests under AddressSanitizer and ThreadSanitizer
 #   make fuzz       libFuzzer on every parser, FUZZ_SECONDS each
 #   make lint       include directions, cppcheck, shell and JSON syntax
@@ -58,7 +59,7 @@ PROGRAM_OF_server_groomd.c = groomd
 PROGRAM_OF_server_worker_main.c = groom-worker
 PROGRAM_OF_client_groomctl_main.c = groomctl
 
-.PHONY: all setup programs lib run test unit check-all bench asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
+.PHONY: all setup programs lib run test unit check-all bench real-captures asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
 .DEFAULT_GOAL := all
 
 all: setup
@@ -181,6 +182,12 @@ $(BUILD)/tests/fuzz/replay_%: $(BUILD)/obj/tests/fuzz/fuzz_%.o $(BUILD)/obj/test
 bench: setup
 	+@$(SUBMAKE) programs node-packages $(BENCHES)
 	@BUILD=$(BUILD) tests/bench/run.sh
+
+CAPTURES ?= ../shared/data
+real-captures: setup
+	+@$(SUBMAKE) $(BUILD)/tests/bench/real_captures
+	@mkdir -p $(BUILD)/real-captures
+	@$(BUILD)/tests/bench/real_captures $(CAPTURES) $(BUILD)/real-captures
 
 lint:
 	@tests/lint.sh

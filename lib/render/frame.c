@@ -78,22 +78,27 @@ static void fit_point(struct fitting *fit, const float p[3])
 
 static void fit_all(struct fitting *fit, const struct render_scene *scene, const struct box *roots)
 {
-    for (uint32_t i = 0; i < scene->strands->n_vertices; i++)
-        if (render_is_finite(scene->strands->points[i]))
-            fit_point(fit, scene->strands->points[i]);
+    for (uint32_t i = 0; i < scene->framed->n_vertices; i++)
+        if (render_is_finite(scene->framed->points[i]))
+            fit_point(fit, scene->framed->points[i]);
     for (uint32_t i = 0; scene->head && i < scene->head->n_vertices; i++)
         if (head_point_counts(roots, scene->head->points[i]))
             fit_point(fit, scene->head->points[i]);
 }
 
-static void gather_boxes(const struct render_scene *scene, struct box *hair, struct box *roots, struct box *all)
+static void hair_box(const struct groom_strands *strands, struct box *hair)
 {
-    const struct groom_strands *strands = scene->strands;
     box_clear(hair);
-    box_clear(roots);
     for (uint32_t i = 0; i < strands->n_vertices; i++)
         if (render_is_finite(strands->points[i]))
             box_add(hair, strands->points[i]);
+}
+
+static void gather_boxes(const struct render_scene *scene, struct box *hair, struct box *roots, struct box *all)
+{
+    const struct groom_strands *strands = scene->framed;
+    hair_box(strands, hair);
+    box_clear(roots);
     for (uint32_t i = 0; i < strands->n_strands; i++)
         if (strands->first[i] < strands->first[i + 1] && render_is_finite(strands->points[strands->first[i]]))
             box_add(roots, strands->points[strands->first[i]]);
@@ -138,14 +143,19 @@ groom_status render_frame(struct render_scene *scene, groom_view view, struct gr
         eye[k] = fit.centre[k] + fit.distance * fit.axes->back[k];
     groom_camera_look_at(eye, fit.centre, FIELD_OF_VIEW, scene->size * scene->samples, scene->size * scene->samples, &scene->camera);
     place_lights(scene, fit.axes);
+    if (!(scene->width > 0))
+        scene->width = hair_width(scene, &hair);
+    if (scene->framed != scene->strands)
+        hair_box(scene->strands, &hair);
+    if (!(hair.low[0] <= hair.high[0]))
+        return groom_fail(diag, GROOM_EEMPTY, "no point of the strands is finite: there is nothing to draw");
     memcpy(scene->hair_min, hair.low, sizeof hair.low);
     memcpy(scene->hair_max, hair.high, sizeof hair.high);
-    /* fit_point has left every point in front of the camera; the corner of the box nearest to it too */
+    /* fit_point has left every point in front of the camera, the corner of the box nearest to it too; of
+     * strands that it is not framed for, those right before the lens are left out */
     double reach = 0;
     for (int k = 0; k < 3; k++)
         reach += fmax((hair.low[k] - fit.centre[k]) * fit.axes->back[k], (hair.high[k] - fit.centre[k]) * fit.axes->back[k]);
-    scene->nearest = (float)fmax(fit.distance - reach, 1e-3 * fit.distance);
-    if (!(scene->width > 0))
-        scene->width = hair_width(scene, &hair);
+    scene->nearest = (float)fmax(fit.distance - reach, (scene->framed == scene->strands ? 1e-3 : 0.2) * fit.distance);
     return GROOM_OK;
 }

@@ -26,7 +26,7 @@ static groom_status check(const struct groom_strands *strands, const struct groo
         return groom_fail(diag, GROOM_EINVAL, "the size is %u; it must be %d..%d pixels", options->size, GROOM_RENDER_MIN_SIZE, GROOM_RENDER_MAX_SIZE);
     if ((unsigned)options->view >= GROOM_VIEW_COUNT)
         return groom_fail(diag, GROOM_EINVAL, "there is no view %d", (int)options->view);
-    if (strands->n_strands == 0)
+    if (strands->n_strands == 0 || (options->framed_as && options->framed_as->n_strands == 0))
         return groom_fail(diag, GROOM_EEMPTY, "there is no strand to draw");
     return head ? groom_mesh_validate(head, diag) : GROOM_OK;
 }
@@ -39,7 +39,7 @@ groom_status groom_render_strands(const struct groom_strands *strands, const str
     if (st != GROOM_OK)
         return st;
     const float *color = options->color;
-    struct render_scene scene = {.strands = strands, .head = head, .context = context, .allocator = memory_allocator(context),
+    struct render_scene scene = {.strands = strands, .framed = options->framed_as ? options->framed_as : strands, .head = head, .context = context, .allocator = memory_allocator(context),
                                  .size = options->size, .samples = samples_for(options->size), .stride = stride_for(strands, options->size),
                                  .width = options->width_m};
     memcpy(scene.color, color[0] > 0 || color[1] > 0 || color[2] > 0 ? color : brown, sizeof scene.color);

@@ -24,6 +24,7 @@ struct render_light_grid {
 
 struct render_scene {
     const struct groom_strands *strands;
+    const struct groom_strands *framed; /* those that the camera is placed for: the same, or others */
     const struct groom_mesh *head; /* or NULL */
     const struct groom_context *context;
     const struct groom_allocator *allocator;
@@ -32,7 +33,7 @@ struct render_scene {
     uint32_t stride;               /* every so many-th strand is drawn */
     float hair_min[3], hair_max[3];
     float width;                   /* of a drawn hair, metres */
-    float nearest;                 /* least depth of the hair's box, metres */
+    float nearest;                 /* least depth of the hair's box, metres; hair nearer than this is not drawn */
     float color[3];
     float key[3], rim[3], view[3]; /* unit vectors towards the lights and the camera */
     struct render_light_grid grid;

@@ -114,6 +114,8 @@ static void shade_strand(const struct render_scene *scene, uint32_t strand)
     for (uint32_t i = s->first[strand]; i < s->first[strand + 1]; i++) {
         const float *p = s->points[i], *q = i + 1 < s->first[strand + 1] ? s->points[i + 1] : p;
         project(scene, p, &scene->hair[i]);
+        if (scene->framed != scene->strands && scene->hair[i].depth < scene->nearest)
+            scene->hair[i].x = scene->hair[i].y = NAN;
         scene->hair[i].color = render_is_finite(p) && render_is_finite(q) ? hair_color(scene, &c, p, q) : 0;
     }
 }

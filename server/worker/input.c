@@ -1,5 +1,6 @@
 /* Standard input and output of the commands that parse. */
 #include <errno.h>
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -23,6 +24,18 @@ void worker_input_open(int fd, struct worker_input *input)
     input->n_map = (size_t)status.st_size;
     madvise(input->map, input->n_map, MADV_SEQUENTIAL);
     input->source = groom_source_from_memory(&input->memory, input->map, input->n_map);
+}
+
+groom_status worker_input_open_path(const char *path, const char *what, struct worker_input *input, struct groom_diag *diag)
+{
+    if (!path)
+        return GROOM_OK;
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0)
+        return groom_fail(diag, GROOM_EIO, "%s cannot be opened: %s", what, strerror(errno));
+    worker_input_open(fd, input);
+    close(fd); /* the mapping holds the file */
+    return input->map ? GROOM_OK : groom_fail(diag, GROOM_EIO, "%s is empty or no regular file", what);
 }
 
 void worker_input_close(struct worker_input *input)

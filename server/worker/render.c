@@ -1,10 +1,7 @@
 /* render: a shaded picture of strands, on a head where one is named. */
-#include <errno.h>
-#include <fcntl.h>
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 #include "groom/format.h"
@@ -14,16 +11,18 @@
 
 struct request {
     const char *unit, *up, *head, *head_unit, *head_up, *view, *size;
-    struct groom_frame frame, head_frame;
+    const char *as, *as_unit, *as_up; /* other strands, whose camera is taken */
+    struct groom_frame frame, head_frame, as_frame;
     struct groom_render_options options;
-    struct worker_input head_input;
+    struct worker_input head_input, as_input;
 };
 
 static int parse(int argc, char **argv, struct request *request)
 {
     static const struct option options[] = {
         {"unit", 1, NULL, 'u'},    {"up", 1, NULL, 'a'},      {"head", 1, NULL, 'h'}, {"head-unit", 1, NULL, 'U'},
-        {"head-up", 1, NULL, 'A'}, {"view", 1, NULL, 'v'},    {"size", 1, NULL, 's'}, {NULL, 0, NULL, 0}};
+        {"head-up", 1, NULL, 'A'}, {"view", 1, NULL, 'v'},    {"size", 1, NULL, 's'},
+        {"framed-as", 1, NULL, 'f'}, {"framed-unit", 1, NULL, 'F'}, {"framed-up", 1, NULL, 'g'}, {NULL, 0, NULL, 0}};
     int c;
     while ((c = getopt_long(argc, argv, "", options, NULL)) != -1) {
         switch (c) {
@@ -34,6 +33,9 @@ static int parse(int argc, char **argv, struct request *request)
         case 'A': request->head_up = optarg; break;
         case 'v': request->view = optarg; break;
         case 's': request->size = optarg; break;
+        case 'f': request->as = optarg; break;
+        case 'F': request->as_unit = optarg; break;
+        case 'g': request->as_up = optarg; break;
         default: return 0;
         }
     }
@@ -47,22 +49,11 @@ static groom_status interpret(struct request *request, struct groom_diag *diag)
     unsigned long long size = 0;
     groom_status st = worker_frame_parse(request->unit, request->up, &request->frame, diag);
     if (st == GROOM_OK) st = worker_frame_parse(request->head_unit, request->head_up, &request->head_frame, diag);
+    if (st == GROOM_OK) st = worker_frame_parse(request->as_unit, request->as_up, &request->as_frame, diag);
     if (st == GROOM_OK) st = groom_view_parse(request->view ? request->view : "front", &request->options.view, diag);
     if (st == GROOM_OK) st = worker_count_parse("--size", request->size, GROOM_RENDER_MAX_SIZE, &size, diag);
     request->options.size = size ? (uint32_t)size : 512;
     return st;
-}
-
-/* The mapping holds the file; a head that is not a regular file is refused. */
-static groom_status open_head(struct request *request, struct groom_diag *diag)
-{
-    if (!request->head) return GROOM_OK;
-    int fd = open(request->head, O_RDONLY | O_CLOEXEC);
-    if (fd < 0) return groom_fail(diag, GROOM_EIO, "the head cannot be opened: %s", strerror(errno));
-    worker_input_open(fd, &request->head_input);
-    close(fd);
-    if (!request->head_input.map) return groom_fail(diag, GROOM_EIO, "the head is empty or no regular file");
-    return GROOM_OK;
 }
 
 static groom_status draw(const struct groom_strands *strands, const struct groom_mesh *mesh,
@@ -83,15 +74,19 @@ static groom_status render(void *user, struct worker_input *input, const struct 
                            struct groom_diag *diag)
 {
     struct request *request = user;
-    struct groom_strands *strands = NULL;
+    struct groom_strands *strands = NULL, *as = NULL;
     struct groom_mesh *mesh = NULL;
     groom_status st = interpret(request, diag);
-    struct groom_read_options read = {.frame = request->frame};
+    struct groom_read_options read = {.frame = request->frame}, read_as = {.frame = request->as_frame};
     struct groom_mesh_read_options read_head = {.frame = request->head_frame};
     if (st == GROOM_OK) st = groom_strands_read(&input->source, &read, context, &strands, NULL, diag);
     if (st == GROOM_OK && request->head)
         st = groom_mesh_read(&request->head_input.source, &read_head, context, &mesh, NULL, diag);
+    if (st == GROOM_OK && request->as)
+        st = groom_strands_read(&request->as_input.source, &read_as, context, &as, NULL, diag);
+    request->options.framed_as = as;
     if (st == GROOM_OK) st = draw(strands, mesh, &request->options, context, diag);
+    groom_strands_destroy(as);
     groom_strands_destroy(strands);
     groom_mesh_destroy(mesh);
     return st;
@@ -102,8 +97,10 @@ int worker_render(int argc, char **argv)
     struct request request = {0};
     struct groom_diag diag = {0};
     if (!parse(argc, argv, &request)) return WORKER_USAGE;
-    groom_status st = open_head(&request, &diag); /* before the sandbox closes the way */
+    groom_status st = worker_input_open_path(request.head, "the head", &request.head_input, &diag);
+    if (st == GROOM_OK) st = worker_input_open_path(request.as, "the file of --framed-as", &request.as_input, &diag);
     int exit_status = st == GROOM_OK ? worker_run_sandboxed(render, &request) : worker_print_problem(st, &diag);
     worker_input_close(&request.head_input);
+    worker_input_close(&request.as_input);
     return exit_status;
 }

@@ -1,7 +1,7 @@
 /* groom-worker: one process for one piece of work, so that whatever goes wrong in it ends it alone.
  *
  *   inspect, convert, check-groom,
- *   render                          parse untrusted bytes for the daemon: standard input to standard
+ *   render, compare                 parse untrusted bytes for the daemon: standard input to standard
  *                                   output, in a sandbox; exit 0, or 1 with a problem on standard output
  *   attempt                         run one attempt of one job, over HTTP (proto/work.h)
  *
@@ -22,6 +22,7 @@ int worker_inspect(int argc, char **argv);
 int worker_convert(int argc, char **argv);
 int worker_check_groom(int argc, char **argv);
 int worker_render(int argc, char **argv);
+int worker_compare(int argc, char **argv);
 int worker_attempt(int argc, char **argv);
 
 /* --- what they share ---------------------------------------------------------- */
@@ -57,6 +58,11 @@ struct worker_input {
 };
 void worker_input_open(int fd, struct worker_input *input);
 void worker_input_close(struct worker_input *input); /* takes zeroed values */
+
+/* A file that a command line names (NULL: nothing is opened), mapped; before the sandbox closes the way.
+ * what     "the head", for the complaint: it must be a regular file that is not empty */
+GROOM_MUST_CHECK groom_status worker_input_open_path(const char *path, const char *what, struct worker_input *input,
+                                                     struct groom_diag *diag);
 
 /* The commands that parse: enter the sandbox, open standard input and a pool of threads, run `body`,
  * print the problem where it fails. Returns the exit status. */

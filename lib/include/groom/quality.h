@@ -112,6 +112,17 @@ GROOM_MUST_CHECK groom_status groom_quality_compare(const struct groom_quality_t
                                                     const struct groom_context *context,
                                                     struct groom_quality *quality, struct groom_diag *diag);
 
+struct groom;
+
+/* Compares a groom's strands with the target, as they are and with every operator's random numbers
+ * drawn from its seed: before and after stage `randoms` of a fit.
+ * drawn    equal to *fitted where the groom's numbers are such draws
+ * memory   the groom once more, and its strands */
+GROOM_MUST_CHECK groom_status groom_quality_of_groom(const struct groom_quality_target *target,
+                                                     const struct groom *groom, const struct groom_context *context,
+                                                     struct groom_quality *fitted, struct groom_quality *drawn,
+                                                     struct groom_diag *diag);
+
 /* {"format":"quality/1","strands":{..},"fitted":{..},"drawn":{..}|null}; proto/openapi.yaml has it whole.
  * fitted   the groom as it is
  * drawn    the same groom with random numbers drawn from its seeds; NULL: not measured

@@ -50,6 +50,9 @@ struct groom_render_options {
     uint32_t size;      /* the picture is size x size pixels */
     float width_m;      /* of a hair; 0: 0.08 mm on a full head, wider for fewer strands */
     float color[3];     /* of hair, linear 0..1; {0, 0, 0}: brown */
+    /* Other strands whose picture's camera this one is taken with, so that the two can be laid side by side;
+     * borrowed for the call. What of the drawn strands is outside of the picture is cut off. NULL: none */
+    const struct groom_strands *framed_as;
 };
 
 /* Draw strands, on a head if there is one.
