@@ -19,6 +19,7 @@
 #include "server/blobs/blobs.h"
 #include "server/config.h"
 #include "server/grooms/grooms.h"
+#include "server/housekeeper.h"
 #include "server/http/handlers.h"
 #include "server/http/server.h"
 #include "server/jobs/supervisor.h"
@@ -43,6 +44,7 @@ struct daemon {
     struct grooms *grooms;
     struct launcher *launcher;
     struct supervisor *supervisor;
+    struct housekeeper *housekeeper;
     struct service service;
     struct server *server;
 };
@@ -214,6 +216,17 @@ static groom_status start_supervisor(struct daemon *daemon, struct groom_diag *d
     return supervisor_start(daemon->jobs, &options, &daemon->supervisor, diag);
 }
 
+static groom_status start_housekeeper(struct daemon *daemon, struct groom_diag *diag)
+{
+    const struct config *config = &daemon->config;
+    return housekeeper_start(&(struct housekeeper_options){.store = daemon->store,
+                                                           .jobs = daemon->jobs,
+                                                           .keep_events_s = config->keep_events_s,
+                                                           .keep_keys_s = config->keep_keys_s,
+                                                           .keep_jobs_s = config->keep_jobs_s},
+                             &daemon->housekeeper, diag);
+}
+
 static groom_status start_server(struct daemon *daemon, struct groom_diag *diag)
 {
     daemon->service = (struct service){.config = &daemon->config,
@@ -241,13 +254,15 @@ static groom_status start(struct daemon *daemon, struct groom_diag *diag)
         (status = listen_open(daemon->config.listen, &daemon->listening, diag)) != GROOM_OK ||
         (status = open_folder(daemon, diag)) != GROOM_OK || (status = open_state(daemon, diag)) != GROOM_OK ||
         (status = open_grooms(daemon, diag)) != GROOM_OK ||
-        (status = start_supervisor(daemon, diag)) != GROOM_OK)
+        (status = start_supervisor(daemon, diag)) != GROOM_OK ||
+        (status = start_housekeeper(daemon, diag)) != GROOM_OK)
         return status;
     return start_server(daemon, diag);
 }
 
 static void finish(struct daemon *daemon)
 {
+    housekeeper_stop(daemon->housekeeper);
     server_destroy(daemon->server);
     supervisor_destroy(daemon->supervisor);
     launch_destroy(daemon->launcher);

@@ -114,6 +114,7 @@ const struct command groomctl_commands[] = {
     {"losses", "JOB", 1, 1, NULL, "the loss curves of a job", command_losses},
     {"list", "strands|heads|jobs|grooms", 1, 1, list_options, "what is on the server, newest first", command_list},
     {"get", "ID", 1, 1, get_options, "all about strands, a head, a job or a groom", command_get},
+    {"delete", "ID...", 1, MANY, NULL, "remove strands, heads or whole grooms; there is no way back", command_delete},
     {"export", "GROOM|STRANDS", 1, 1, export_options, "strands or guides into a file", command_export},
     {"analyze", "GROOM|STRANDS", 1, 1, analyze_options, "what kind of hair it is: curls, handedness, switchbacks", command_analyze},
     {"preview", "GROOM", 1, 1, preview_options, "a shaded picture", command_preview},

@@ -45,6 +45,7 @@ int command_watch(struct groomctl *ctl, const struct arguments *arguments);
 int command_cancel(struct groomctl *ctl, const struct arguments *arguments);
 int command_losses(struct groomctl *ctl, const struct arguments *arguments);
 int command_list(struct groomctl *ctl, const struct arguments *arguments);
+int command_delete(struct groomctl *ctl, const struct arguments *arguments);
 int command_get(struct groomctl *ctl, const struct arguments *arguments);
 int command_export(struct groomctl *ctl, const struct arguments *arguments);
 int command_analyze(struct groomctl *ctl, const struct arguments *arguments);

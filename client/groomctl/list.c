@@ -1,4 +1,4 @@
-/* list and get. */
+/* list, get and delete. */
 #include <stdio.h>
 #include <string.h>
 
@@ -111,4 +111,28 @@ int command_get(struct groomctl *ctl, const struct arguments *arguments)
         api_print(ctl, answer);
     cJSON_Delete(answer);
     return status;
+}
+
+/* --- delete -------------------------------------------------------------------------------- */
+
+static int delete_one(struct groomctl *ctl, const char *id)
+{
+    const struct collection *collection = collection_of(id);
+    struct url url;
+    if (!collection || !strcmp(collection->name, "jobs"))
+        return groomctl_usage_error("delete", "\"%s\" is no id of strands, a head or a groom (jobs: groomctl cancel)",
+                                    id);
+    url_init(&url, collection->path);
+    url_segment(&url, id);
+    return api_json(ctl, "DELETE", url.text, NULL, NULL, NULL);
+}
+
+int command_delete(struct groomctl *ctl, const struct arguments *arguments)
+{
+    int worst = DONE;
+    for (size_t i = 0; i < arguments->n_operands; i++) {
+        int status = delete_one(ctl, arguments->operands[i]);
+        worst = status != DONE ? status : worst;
+    }
+    return worst;
 }

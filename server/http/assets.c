@@ -114,14 +114,19 @@ static groom_status is_referenced(void *store, const char *sha256, bool *referen
     return store_blob_referenced(store, sha256, referenced, NULL);
 }
 
-static void forget_blob(struct request *request, const char *sha256)
+static void collect_blob(struct request *request, const char *sha256)
 {
     bool removed;
-    blobs_unpin(request->service->blobs, sha256);
     /* where this fails the blob is garbage, which a later collection takes */
     if (blobs_collect(request->service->blobs, sha256, is_referenced, request->service->store, &removed,
                       NULL) != GROOM_OK)
         return;
+}
+
+static void forget_blob(struct request *request, const char *sha256)
+{
+    blobs_unpin(request->service->blobs, sha256);
+    collect_blob(request, sha256);
 }
 
 /* groom-worker's answer about the blob; NULL where it was refused (and answered). */
@@ -290,6 +295,25 @@ static void list(struct request *request, const struct kind *kind)
     store_asset_list_finish(&found);
     respond_json(request, 200, object);
 }
+
+/* --- removing ---------------------------------------------------------------------------------- */
+
+static void remove_asset(struct request *request, const struct kind *kind)
+{
+    char garbage[STORE_HASH_SIZE];
+    struct groom_diag diag = {0};
+    groom_status status =
+        store_asset_remove(request->service->store, kind->store, request->parameter[0], garbage, &diag);
+    if (status != GROOM_OK) {
+        respond_failure(request, status, &diag);
+        return;
+    }
+    collect_blob(request, garbage);
+    respond_empty(request, 204);
+}
+
+void assets_delete_strands(struct request *request) { remove_asset(request, &strands); }
+void assets_delete_head(struct request *request) { remove_asset(request, &heads); }
 
 /* --- the bytes again ---------------------------------------------------------------------------- */
 

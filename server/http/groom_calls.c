@@ -15,6 +15,33 @@
 
 /* --- documents ------------------------------------------------------------------------- */
 
+/* All of it at once; an If-Match is honoured, so that nobody removes what he has not seen. */
+void grooms_call_delete(struct request *request)
+{
+    uint32_t expected = 0;
+    struct store_revision latest = {0};
+    struct groom_diag diag = {0};
+    groom_status status = GROOM_OK;
+    if (request_header(request, "If-Match")) {
+        if (!request_if_match(request, &expected))
+            return;
+        status = store_revision_get(request->service->store, request->parameter[0], 0, &latest, &diag);
+        if (status == GROOM_OK && latest.number != expected)
+            respond_refusal(request, 412, "precondition-failed", "it was changed meanwhile",
+                            "the groom is at revision %u, not %u", latest.number, expected);
+        store_revision_finish(&latest);
+    }
+    if (request->response.kind != RESPONSE_NONE)
+        return;
+    if (status == GROOM_OK)
+        status = store_groom_remove(request->service->store, request->parameter[0], &diag);
+    if (status == GROOM_OK)
+        respond_empty(request, 204);
+    else
+        respond_failure(request, status, &diag);
+}
+
+
 void grooms_call_list(struct request *request)
 {
     char *json;

@@ -27,6 +27,8 @@ void assets_get_strands_data(struct request *request);
 void assets_post_head(struct request *request);
 void assets_list_heads(struct request *request);
 void assets_get_head(struct request *request);
+void assets_delete_strands(struct request *request);
+void assets_delete_head(struct request *request);
 void assets_get_head_data(struct request *request);
 
 /* uploads.c: uploads in pieces */
@@ -57,6 +59,7 @@ void work_call_failed(struct request *request);
 void work_call_ended(struct request *request);
 
 /* groom_calls.c */
+void grooms_call_delete(struct request *request);
 void grooms_call_list(struct request *request);
 void grooms_call_import(struct request *request);
 void grooms_call_get(struct request *request);

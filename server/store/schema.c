@@ -76,7 +76,12 @@ static const char version_3[] =
     "CREATE INDEX uploads_by_hash ON uploads (sha256) WHERE sha256 <> '';"
     "CREATE INDEX uploads_by_end ON uploads (expires);";
 
-const char *const schema_steps[] = {version_1, version_2, version_3};
+/* what goes after a time, found without looking at all jobs */
+static const char version_4[] =
+    "ALTER TABLE jobs ADD COLUMN events_retired INTEGER NOT NULL DEFAULT 0;"
+    "CREATE INDEX jobs_by_end ON jobs (finished) WHERE state >= 2;";
+
+const char *const schema_steps[] = {version_1, version_2, version_3, version_4};
 const int schema_version = sizeof schema_steps / sizeof schema_steps[0];
 
 static groom_status read_version(sqlite3 *db, int *version, struct groom_diag *diag)

@@ -87,6 +87,10 @@ GROOM_MUST_CHECK groom_status store_asset_get(struct store *store, enum store_as
 GROOM_MUST_CHECK groom_status store_assets_list(struct store *store, enum store_asset_kind kind,
                                                 struct store_page page, struct store_asset_list *list,
                                                 struct groom_diag *diag);
+/* `garbage` is its blob, for the caller to collect. Grooms that were made of it have what they need.
+ * returns  GROOM_ENOTFOUND, GROOM_ECONFLICT (a job that has not ended needs it; detail names one) */
+GROOM_MUST_CHECK groom_status store_asset_remove(struct store *store, enum store_asset_kind kind, const char *id,
+                                                 char garbage[STORE_HASH_SIZE], struct groom_diag *diag);
 void store_asset_finish(struct store_asset *asset);
 void store_asset_list_finish(struct store_asset_list *list);
 
@@ -197,6 +201,8 @@ GROOM_MUST_CHECK groom_status store_revisions_list(struct store *store, const ch
                                                    struct groom_diag *diag);
 GROOM_MUST_CHECK groom_status store_grooms_list(struct store *store, struct store_page page,
                                                 struct store_groom_list *list, struct groom_diag *diag);
+/* With all its revisions, and the arrays that no other groom has. returns  GROOM_ENOTFOUND */
+GROOM_MUST_CHECK groom_status store_groom_remove(struct store *store, const char *id, struct groom_diag *diag);
 void store_revision_finish(struct store_revision *revision);
 void store_revision_list_finish(struct store_revision_list *list);
 void store_groom_list_finish(struct store_groom_list *list);
@@ -411,7 +417,7 @@ GROOM_MUST_CHECK groom_status store_job_move(struct store *store, const struct s
 /* --- events and losses ---------------------------------------------------------------------------------- */
 
 struct store_event {
-    int64_t sequence; /* from 1 within a job, without gaps */
+    int64_t sequence; /* from 1 within a job, without gaps until store_retire */
     char *type;       /* "stage", "progress", "loss", "state" */
     char *data;       /* JSON */
     int64_t created_ms;
@@ -453,6 +459,20 @@ struct store_counts {
 };
 GROOM_MUST_CHECK groom_status store_count(struct store *store, struct store_counts *counts,
                                           struct groom_diag *diag);
+
+/* What goes: rows of jobs that ended before these times; 0: nothing of the kind. */
+struct store_retention {
+    int64_t events_before_ms; /* progress and loss events; states, stages and losses stay */
+    int64_t keys_before_ms;   /* idempotency keys that are as old and whose job has ended */
+    int64_t jobs_before_ms;   /* jobs with all that is theirs; not the grooms that they made */
+};
+struct store_retired {
+    uint64_t n_event_streams, n_keys, n_jobs;
+};
+/* One transaction, at most max_rows of each kind: call again where so many went. */
+GROOM_MUST_CHECK groom_status store_retire(struct store *store, const struct store_retention *retention,
+                                           uint32_t max_rows, struct store_retired *retired,
+                                           struct groom_diag *diag);
 
 /* Does any row refer to this blob? What the collector of blobs asks. */
 GROOM_MUST_CHECK groom_status store_blob_referenced(struct store *store, const char *sha256, bool *referenced,

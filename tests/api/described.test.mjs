@@ -81,6 +81,9 @@ test('every operation answers as it is described', async (t) => {
     await get(`${at}/clusters?count=3`);
   }
 
+  const other = (await expect(daemon, 201, 'POST', '/v1/grooms', { body: groom_document() })).json.groom;
+  for (const path of [`grooms/${other}`, `strands/${strands.id}`, `heads/${head.id}`]) await expect(daemon, 204, 'DELETE', `/v1/${path}`);
+
   const missing = operations.map(({ operation }) => operation.operationId).filter((id) => !seen.has(id));
   assert.deepEqual(missing, [], 'operations that no call exercised');
 });
