@@ -97,7 +97,8 @@ $(PARTS_A): $(call objects,$(filter-out $(MAINS),$(DAEMON_SOURCES) $(WORKER_SOUR
 # same order (no contraction): a strand's numbers are the same bits in the page and in the daemon.
 # Documents are taken apart by engine.mjs. Random123 asks for a processor that it knows; any will do.
 ENGINE_SOURCES = $(addprefix lib/base/,diag.c memory.c pool_serial.c random.c status.c) \
-                 $(filter-out lib/model/document_%,$(call find_c,lib/model)) lib/strands/strands.c client/web/engine/engine.c
+                 $(filter-out lib/model/document_%,$(call find_c,lib/model)) lib/strands/strands.c lib/render/light.c \
+                 client/web/engine/engine.c
 ENGINE_FLAGS   = --target=wasm32-wasi -std=c11 -D_GNU_SOURCE -O3 -msimd128 -ffp-contract=off -fno-math-errno \
                  -fno-trapping-math -ffunction-sections $(WARNINGS) -Ilib/include -Ilib
 ENGINE_OBJECTS = $(patsubst %.c,build/web/obj/%.o,$(ENGINE_SOURCES))
@@ -108,7 +109,14 @@ build/web/obj/%.o: %.c
 $(ENGINE): $(ENGINE_OBJECTS)
 	clang --target=wasm32-wasi -mexec-model=reactor -O3 -Wl,--gc-sections,--strip-all -o $@ $^ -lm
 
+# The studio: bundled and compressed by esbuild.
+STUDIO         = build/web/studio/.bundled
+$(STUDIO): $(wildcard client/web/*.mjs client/web/index.html) $(shell find client/web/src client/web/engine -type f) $(ENGINE) client/web/node_modules/.installed
+	node client/web/build.mjs $(ENGINE) $(@D)
+	@touch $@
+
 # Files that are embedded (proto/embed.h).
+$(BUILD)/obj/server/http/studio.o: $(STUDIO)
 $(BUILD)/obj/server/http/about.o: proto/openapi.json
 $(BUILD)/obj/server/http/page.o: server/http/status.css
 
@@ -141,9 +149,9 @@ api e2e: programs node-packages
 	@BUILD=$(BUILD) tests/run.sh $@
 
 node-packages: tests/node_modules/.installed
-tests/node_modules/.installed: tests/package.json tests/package-lock.json
-	@echo "setup: installing the npm packages of tests/package-lock.json"
-	cd tests && npm ci --no-audit --no-fund --ignore-scripts
+%/node_modules/.installed: %/package.json %/package-lock.json
+	@echo "setup: installing the npm packages of $*/package-lock.json"
+	cd $* && npm ci --no-audit --no-fund --ignore-scripts
 	@touch $@
 
 asan tsan:

@@ -1,7 +1,6 @@
 /* Where the camera stands: far enough, along the view's axis, for all of the hair and the head
  * around it; and the lights, which stand with the camera so that every view is lit alike. */
 #include <math.h>
-#include <string.h>
 
 #include "render/scene.h"
 
@@ -149,8 +148,6 @@ groom_status render_frame(struct render_scene *scene, groom_view view, struct gr
         hair_box(scene->strands, &hair);
     if (!(hair.low[0] <= hair.high[0]))
         return groom_fail(diag, GROOM_EEMPTY, "no point of the strands is finite: there is nothing to draw");
-    memcpy(scene->hair_min, hair.low, sizeof hair.low);
-    memcpy(scene->hair_max, hair.high, sizeof hair.high);
     /* fit_point has left every point in front of the camera, the corner of the box nearest to it too; of
      * strands that it is not framed for, those right before the lens are left out */
     double reach = 0;

@@ -6,6 +6,8 @@
 #include "base/progress.h"
 #include "render/scene.h"
 
+#define LIGHT_CELLS 96
+
 static const float brown[3] = {0.20f, 0.105f, 0.05f};
 
 /* Small pictures get more samples: a hair is a smaller part of their pixels. */
@@ -45,14 +47,15 @@ groom_status groom_render_strands(const struct groom_strands *strands, const str
     memcpy(scene.color, color[0] > 0 || color[1] > 0 || color[2] > 0 ? color : brown, sizeof scene.color);
     if ((st = render_frame(&scene, options->view, diag)) != GROOM_OK)
         return st;
-    st = render_light_create(&scene, diag);
+    struct groom_light_options light = {LIGHT_CELLS, scene.stride, scene.width, {scene.key[0], scene.key[1], scene.key[2]}};
+    st = groom_light_create(strands, &light, context, &scene.light, diag);
     if (st == GROOM_OK)
         st = render_shade(&scene, diag);
     if (st == GROOM_OK && progress_cancelled(context))
         st = groom_fail(diag, GROOM_ECANCELLED, "the picture was cancelled");
     if (st == GROOM_OK)
         st = render_raster(&scene, rgba, diag);
-    render_light_destroy(&scene);
+    groom_light_destroy(scene.light);
     memory_release(scene.allocator, scene.hair, strands->n_vertices, sizeof *scene.hair);
     memory_release(scene.allocator, scene.skin, head ? head->n_vertices : 0, sizeof *scene.skin);
     return st;

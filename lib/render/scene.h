@@ -13,15 +13,6 @@ struct render_vertex {
     uint32_t color; /* of hair: of the segment that begins here. Packed by color_pack */
 };
 
-/* Where hair is thick: how much of each light reaches a place through it. */
-struct render_light_grid {
-    uint32_t size[3];      /* cells */
-    float origin[3], cell; /* corner of the first; edge length (m) */
-    uint64_t *length;      /* [cells] hair in the cell, in 1/1024 of its edge */
-    float *key;            /* [cells] optical depth towards the key light */
-    float *ambient;        /* [cells] how much of the surroundings is seen, 0..1 */
-};
-
 struct render_scene {
     const struct groom_strands *strands;
     const struct groom_strands *framed; /* those that the camera is placed for: the same, or others */
@@ -31,24 +22,17 @@ struct render_scene {
     struct groom_camera camera;    /* in samples */
     uint32_t size, samples;        /* pixels a side; samples a side of a pixel */
     uint32_t stride;               /* every so many-th strand is drawn */
-    float hair_min[3], hair_max[3];
     float width;                   /* of a drawn hair, metres */
     float nearest;                 /* least depth of the hair's box, metres; hair nearer than this is not drawn */
     float color[3];
     float key[3], rim[3], view[3]; /* unit vectors towards the lights and the camera */
-    struct render_light_grid grid;
+    struct groom_light *light;
     struct render_vertex *hair;    /* [strands->n_vertices] */
     struct render_vertex *skin;    /* [head->n_vertices] */
 };
 
 /* frame.c: the camera, the lights that go with it, the hair's box and width */
 GROOM_MUST_CHECK groom_status render_frame(struct render_scene *scene, groom_view view, struct groom_diag *diag);
-
-/* light.c: fill scene->grid */
-GROOM_MUST_CHECK groom_status render_light_create(struct render_scene *scene, struct groom_diag *diag);
-void render_light_destroy(struct render_scene *scene);
-/* At a place: the fraction of the key light and of the surroundings that reach it. */
-void render_light_at(const struct render_light_grid *grid, const float p[3], float *key, float *ambient);
 
 /* shade.c: fill scene->hair and scene->skin */
 GROOM_MUST_CHECK groom_status render_shade(struct render_scene *scene, struct groom_diag *diag);

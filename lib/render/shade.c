@@ -98,7 +98,7 @@ static uint32_t hair_color(const struct render_scene *scene, const struct charac
         middle[k] = 0.5f * (p[k] + q[k]);
     }
     normalize(tangent);
-    render_light_at(&scene->grid, middle, &key, &ambient);
+    groom_light_at(scene->light, middle, &key, &ambient);
     float open = ambient * ambient;
     for (int k = 0; k < 3; k++)
         color[k] = sky[k] * c->color[k] * (0.06f + 0.94f * open);
@@ -164,7 +164,7 @@ static void shade_skin(struct render_scene *scene, float (*normals)[3])
         float key, ambient, color[3];
         normalize(normals[i]);
         project(scene, p, &scene->skin[i]);
-        render_light_at(&scene->grid, p, &key, &ambient);
+        groom_light_at(scene->light, p, &key, &ambient);
         float facing = fmaxf(0, 0.75f * dot(normals[i], scene->key) + 0.25f);
         float rim = fmaxf(0, dot(normals[i], scene->rim)), above = 0.6f + 0.4f * normals[i][1];
         for (int k = 0; k < 3; k++)

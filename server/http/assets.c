@@ -342,16 +342,25 @@ static void respond_blob(struct request *request, const struct store_asset *asse
     respond_etag(request, "%s", asset->sha256);
 }
 
-static void convert(struct request *request, const struct store_asset *asset, groom_format format,
-                    struct groom_frame frame, const char *etag)
+/* What an export of an upload shall be. */
+struct wanted {
+    groom_format format;
+    struct groom_frame frame;
+    uint64_t count, vertices; /* 0: as uploaded */
+};
+
+static void convert(struct request *request, const struct store_asset *asset, const struct wanted *wanted,
+                    const char *etag)
 {
     int from, to = -1;
     uint64_t n_bytes;
-    char from_unit[40], unit[40], from_up[2] = {asset->up, 0};
+    char from_unit[40], unit[40], from_up[2] = {asset->up, 0}, count[24], vertices[24];
     struct groom_diag diag = {0};
     snprintf(from_unit, sizeof from_unit, "%.17g", asset->unit_m);
-    snprintf(unit, sizeof unit, "%.17g", frame.unit_m);
-    const char *const arguments[] = {"convert",
+    snprintf(unit, sizeof unit, "%.17g", wanted->frame.unit_m);
+    snprintf(count, sizeof count, "%llu", (unsigned long long)wanted->count);
+    snprintf(vertices, sizeof vertices, "%llu", (unsigned long long)wanted->vertices);
+    const char *arguments[20] = {"convert",
                                      "--from-format",
                                      asset->format,
                                      "--from-unit",
@@ -359,19 +368,27 @@ static void convert(struct request *request, const struct store_asset *asset, gr
                                      "--from-up",
                                      from_up,
                                      "--to-format",
-                                     groom_format_name(format),
+                                     groom_format_name(wanted->format),
                                      "--unit",
                                      unit,
                                      "--up",
-                                     frame.up == GROOM_UP_Z ? "z" : "y",
-                                     NULL};
+                                     wanted->frame.up == GROOM_UP_Z ? "z" : "y"};
+    size_t n = 13;
+    if (wanted->count) {
+        arguments[n++] = "--count";
+        arguments[n++] = count;
+    }
+    if (wanted->vertices) {
+        arguments[n++] = "--vertices";
+        arguments[n++] = vertices;
+    }
     groom_status status = blobs_read(request->service->blobs, asset->sha256, &from, &n_bytes, &diag);
     if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
         return;
     }
     if ((to = tool_temporary(request)) >= 0 && tool_run(request, arguments, from, to, NULL, NULL)) {
-        tool_respond_file(request, format, asset->id, etag, to, (uint64_t)lseek(to, 0, SEEK_END));
+        tool_respond_file(request, wanted->format, asset->id, etag, to, (uint64_t)lseek(to, 0, SEEK_END));
         to = -1;
     }
     close(from);
@@ -382,25 +399,28 @@ static void convert(struct request *request, const struct store_asset *asset, gr
 /* Metres and y up where nothing else is asked for; the very bytes where that is what they are. */
 static void strands_data(struct request *request, const struct store_asset *asset)
 {
-    struct groom_frame frame = {.unit_m = 1};
-    groom_format own = GROOM_FORMAT_AUTO, format;
-    char etag[80];
+    struct wanted wanted = {.frame = {.unit_m = 1}};
+    groom_format own = GROOM_FORMAT_AUTO;
+    char etag[120];
     if (groom_format_parse(asset->format, &own, NULL) != GROOM_OK)
         own = GROOM_FORMAT_AUTO;
-    format = groom_format_writable(own) ? own : GROOM_FORMAT_HAIR;
-    if (!tool_query_format(request, true, &format) || !tool_query_frame(request, &frame))
+    wanted.format = groom_format_writable(own) ? own : GROOM_FORMAT_HAIR;
+    if (!tool_query_format(request, true, &wanted.format) || !tool_query_frame(request, &wanted.frame) ||
+        !request_query_number(request, "count", 1, UINT32_MAX, &wanted.count) ||
+        !request_query_number(request, "vertices", 2, 65536, &wanted.vertices))
         return;
-    bool same_up = (asset->up == 'z') == (frame.up == GROOM_UP_Z);
-    bool same_unit = !(frame.unit_m < asset->unit_m) && !(frame.unit_m > asset->unit_m);
-    if (format == own && same_up && same_unit) {
+    bool same_up = (asset->up == 'z') == (wanted.frame.up == GROOM_UP_Z);
+    bool same_unit = !(wanted.frame.unit_m < asset->unit_m) && !(wanted.frame.unit_m > asset->unit_m);
+    if (wanted.format == own && same_up && same_unit && !wanted.count && !wanted.vertices) {
         if (!request_not_modified(request, asset->sha256))
-            respond_blob(request, asset, format);
+            respond_blob(request, asset, wanted.format);
         return;
     }
-    snprintf(etag, sizeof etag, "%s-%s-%.9g-%s", asset->id, groom_format_name(format), frame.unit_m,
-             frame.up == GROOM_UP_Z ? "z" : "y");
+    snprintf(etag, sizeof etag, "%s-%s-%.9g-%s-%llu-%llu", asset->id, groom_format_name(wanted.format),
+             wanted.frame.unit_m, wanted.frame.up == GROOM_UP_Z ? "z" : "y", (unsigned long long)wanted.count,
+             (unsigned long long)wanted.vertices);
     if (!request_not_modified(request, etag))
-        convert(request, asset, format, frame, etag);
+        convert(request, asset, &wanted, etag);
 }
 
 void assets_get_strands_data(struct request *request)

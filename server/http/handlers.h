@@ -14,6 +14,10 @@ void about_metrics(struct request *request);
 void about_options(struct request *request);
 void about_openapi(struct request *request);
 
+/* studio.c: the web studio */
+void studio_index(struct request *request);
+void studio_file(struct request *request);
+
 /* page.c: the status page */
 void page_index(struct request *request);
 void page_style(struct request *request);

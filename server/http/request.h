@@ -43,7 +43,7 @@ struct response {
     size_t n_headers;
     struct {
         const char *name;
-        char value[232];
+        char value[320];
     } headers[RESPONSE_MAX_HEADERS];
 };
 

@@ -3,7 +3,9 @@
 
 /* clang-format off */
 const struct route http_routes[] = {
-    {"GET", "/", page_index, BODY_NONE, LANE_FAST, "", 0, NULL},
+    {"GET", "/", studio_index, BODY_NONE, LANE_INLINE, "", 0, NULL},
+    {"GET", "/studio/{file}", studio_file, BODY_NONE, LANE_INLINE, "", 0, NULL},
+    {"GET", "/status", page_index, BODY_NONE, LANE_FAST, "", 0, NULL},
     {"GET", "/status.css", page_style, BODY_NONE, LANE_INLINE, "", 0, NULL},
     {"GET", "/healthz", about_health, BODY_NONE, LANE_INLINE, "", ROUTE_QUIET, NULL},
     {"GET", "/readyz", about_ready, BODY_NONE, LANE_FAST, "", ROUTE_QUIET, NULL},
@@ -15,7 +17,7 @@ const struct route http_routes[] = {
     {"GET", "/v1/strands", assets_list_strands, BODY_NONE, LANE_FAST, "limit before", 0, NULL},
     {"GET", "/v1/strands/{id}", assets_get_strands, BODY_NONE, LANE_FAST, "", 0, NULL},
     {"DELETE", "/v1/strands/{id}", assets_delete_strands, BODY_NONE, LANE_FAST, "", 0, NULL},
-    {"GET", "/v1/strands/{id}/data", assets_get_strands_data, BODY_NONE, LANE_SLOW, "format unit up", 0, NULL},
+    {"GET", "/v1/strands/{id}/data", assets_get_strands_data, BODY_NONE, LANE_SLOW, "format unit up count vertices", 0, NULL},
     {"GET", "/v1/strands/{id}/analysis", analysis_call_strands, BODY_NONE, LANE_SLOW, "count elements tolerance straight_below wavy_below arrays format", 0, NULL},
     {"GET", "/v1/strands/{id}/clusters", clusters_call_strands, BODY_NONE, LANE_SLOW, "count seed frames", 0, NULL},
     {"POST", "/v1/heads", assets_post_head, BODY_BLOB, LANE_SLOW, "format unit up name upload", 0, assets_check_upload},

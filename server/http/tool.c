@@ -13,7 +13,7 @@
 #include "server/launch/child.h"
 #include "server/log.h"
 
-#define MAX_ARGUMENTS 16
+#define MAX_ARGUMENTS 24
 #define MAX_PROBLEM   65536
 
 /* --- groom-worker ------------------------------------------------------------------------ */

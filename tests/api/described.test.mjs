@@ -29,7 +29,7 @@ test('the table of routes and the description name the same calls', () => {
 test('every operation answers as it is described', async (t) => {
   const daemon = await startIdleDaemon(t);
   const get = (path, status = 200, options) => expect(daemon, status, 'GET', path, options);
-  for (const path of ['/', '/status.css', '/healthz', '/readyz', '/metrics', '/openapi.json', '/v1/options', '/v1/strands', '/v1/heads', '/v1/jobs', '/v1/grooms'])
+  for (const path of ['/', '/studio/studio.js', '/status', '/status.css', '/healthz', '/readyz', '/metrics', '/openapi.json', '/v1/options', '/v1/strands', '/v1/heads', '/v1/jobs', '/v1/grooms'])
     await get(path);
 
   const strands = await upload(daemon);

@@ -37,7 +37,7 @@ test('page and daemon evaluate every style alike, to the bit', async (t) => {
     await t.test(style, async (inner) => {
       const document = sample(inner, style);
       const { json } = await expect(daemon, 201, 'POST', '/v1/grooms', { body: document });
-      const groom = new Groom(engine, document);
+      const groom = Groom.fromDocument(engine, document);
       assert.deepEqual(data_of(groom), await exported(daemon, json.groom));
       groom.destroy();
     });
@@ -47,7 +47,7 @@ test('an edit moves the page and the daemon alike', async (t) => {
   const daemon = await startDaemon(t);
   const document = sample(t, 'curly');
   const { json } = await expect(daemon, 201, 'POST', '/v1/grooms', { body: document });
-  const groom = new Groom(engine, document);
+  const groom = Groom.fromDocument(engine, document);
   const curl = document.operators.findIndex((o) => o.type === 'curl');
   let revision = json.revision;
   const both = async (operations, edit) => {
@@ -76,5 +76,5 @@ test('operators carry what a slider needs', () => {
 test('a document that cannot be is refused with the culprit', (t) => {
   const document = sample(t, 'straight');
   document.operators[0].random_scale = 1e9;
-  assert.throws(() => new Groom(engine, document), (error) => error.pointer.startsWith('/operators/0/') && error.message.length > 10);
+  assert.throws(() => Groom.fromDocument(engine, document), (error) => error.pointer.startsWith('/operators/0/') && error.message.length > 10);
 });

@@ -35,12 +35,26 @@ test('what the service says of itself', async (t) => {
   });
   await t.test('the page lists what there is, escaped, with a policy', async () => {
     await call(daemon, 'POST', '/v1/grooms', { body: (await import('../support/api.mjs')).groom_document({ name: '<script>"&' }) });
-    const { text, headers } = await expect(daemon, 200, 'GET', '/');
+    const { text, headers } = await expect(daemon, 200, 'GET', '/status');
     assert.match(text, /&lt;script&gt;&quot;&amp;/);
     assert.doesNotMatch(text, /<script>/);
     assert.doesNotMatch(text, /(src|href)="(https?:)?\/\//);
     assert.match(headers.get('content-security-policy'), /default-src 'none'/);
     await expect(daemon, 200, 'GET', '/status.css');
+  });
+  await t.test('the studio comes from here alone, compressed where the client takes it', async () => {
+    const { text, headers } = await expect(daemon, 200, 'GET', '/');
+    assert.match(text, /<script type="module" src="\/studio\/studio.js">/);
+    assert.match(headers.get('content-security-policy'), /default-src 'none'; script-src 'self' 'wasm-unsafe-eval'/);
+    for (const name of ['studio.js', 'studio.css', 'worker.js', 'engine.wasm']) {
+      const small = await expect(daemon, 200, 'GET', `/studio/${name}`);
+      const plain = await expect(daemon, 200, 'GET', `/studio/${name}`, { headers: { 'Accept-Encoding': 'identity' } });
+      assert.equal(small.headers.get('content-encoding'), 'gzip');
+      assert.equal(plain.headers.get('content-encoding'), null);
+      assert.deepEqual(small.bytes, plain.bytes);
+      await expect(daemon, 304, 'GET', `/studio/${name}`, { headers: { 'If-None-Match': small.headers.get('etag') } });
+    }
+    await refused(daemon, 404, 'not-found', 'GET', '/studio/passwd');
   });
   await t.test('each answer has a request id, which the log has too', async () => {
     const { headers } = await call(daemon, 'GET', '/v1/grooms');

@@ -31,7 +31,7 @@ function page_ms(groom) {
 
 const document = sample(), text = JSON.stringify(document);
 const engine = await Engine.load(readFileSync(join(top, 'build/web/engine.wasm')));
-const groom = new Groom(engine, document);
+const groom = Groom.fromDocument(engine, document);
 let page = Infinity, native = Infinity;
 for (let round = 0; round < 3; round++) {
   page = Math.min(page, page_ms(groom));

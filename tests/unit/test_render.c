@@ -140,6 +140,32 @@ START_TEST(pictures_are_the_same_bits_for_1_and_3_threads)
 }
 END_TEST
 
+START_TEST(the_middle_of_a_tuft_is_darker_than_its_lit_side)
+{
+    struct groom_strands *s = tuft(1);
+    struct groom_light_options options = {.cells = 48, .stride = 1, .width_m = 2e-3f, .key = {0, 1, 0}};
+    struct groom_light *light = NULL;
+    float key[2], ambient[2], middle[3], above[3], low = INFINITY, high = -INFINITY;
+    ck_ok(groom_light_create(s, &options, NULL, &light, NULL));
+    for (int k = 0; k < 3; k++)
+        middle[k] = above[k] = light->origin[k] + 0.5f * light->cell * (float)light->size[k];
+    above[1] = light->origin[1] + light->cell * (float)light->size[1];
+    groom_light_at(light, middle, &key[0], &ambient[0]);
+    groom_light_at(light, above, &key[1], &ambient[1]);
+    ck_assert_float_lt(key[0], key[1]);
+    ck_assert_float_lt(ambient[0], ambient[1]);
+    for (uint32_t c = 0; c < light->size[0] * light->size[1] * light->size[2]; c++) {
+        low = fminf(low, light->ambient[c]);
+        high = fmaxf(high, light->ambient[c]);
+    }
+    ck_assert(low >= 0 && high <= 1.0001f);
+    groom_light_destroy(light);
+    options.cells = 4;
+    ck_status(groom_light_create(s, &options, NULL, &light, NULL), GROOM_EINVAL);
+    groom_strands_destroy(s);
+}
+END_TEST
+
 START_TEST(odd_strands_and_options_are_answered_calmly)
 {
     static uint8_t rgba[SIZE * SIZE * 4];
@@ -240,5 +266,5 @@ START_TEST(each_failing_allocation_is_reported_and_leaks_nothing)
 END_TEST
 
 TEST_SUITE("render", hair_is_seen_from_every_side, the_head_hides_hair_behind_it, views_are_the_right_way_round,
-           pictures_are_the_same_bits_for_1_and_3_threads, odd_strands_and_options_are_answered_calmly, views_have_names,
+           pictures_are_the_same_bits_for_1_and_3_threads, the_middle_of_a_tuft_is_darker_than_its_lit_side, odd_strands_and_options_are_answered_calmly, views_have_names,
            a_png_decodes_to_the_same_pixels, each_failing_allocation_is_reported_and_leaks_nothing)

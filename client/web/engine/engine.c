@@ -9,6 +9,7 @@
 
 #include "groom/diag.h"
 #include "groom/groom.h"
+#include "groom/render.h"
 
 #pragma clang diagnostic ignored "-Wmissing-prototypes" /* nothing in C calls these */
 #define EXPORT(name) __attribute__((export_name(#name))) name
@@ -127,3 +128,38 @@ groom_status EXPORT(engine_evaluate)(const struct groom *groom, uint32_t first, 
     memset(&last, 0, sizeof last);
     return groom_evaluate(groom, first, count, out, NULL, &last);
 }
+
+/* The first `count` strands of the fair order alone: what a viewer shows of many. */
+struct groom *EXPORT(engine_select)(const struct groom *groom, uint32_t count)
+{
+    struct groom *selected = NULL;
+    uint32_t *order = malloc(groom->n_strands * sizeof *order);
+    memset(&last, 0, sizeof last);
+    if (!order)
+        return NULL;
+    groom_fair_order(groom->n_strands, order);
+    groom_status st = groom_select(groom, order, count, NULL, &selected, &last);
+    free(order);
+    return st == GROOM_OK ? selected : NULL;
+}
+
+/* --- light --------------------------------------------------------------------------------- */
+
+/* Shadows within strands of one vertex count, towards the light (x, y, z). */
+struct groom_light *EXPORT(engine_light)(float (*points)[3], uint32_t n_strands, uint32_t n_vertices, uint32_t cells,
+                                         float width_m, float x, float y, float z)
+{
+    struct groom_light_options options = {.cells = cells, .stride = 1, .width_m = width_m, .key = {x, y, z}};
+    struct groom_light *light = NULL;
+    uint32_t *first = malloc((n_strands + 1) * sizeof *first);
+    memset(&last, 0, sizeof last);
+    for (uint32_t i = 0; first && i <= n_strands; i++)
+        first[i] = i * n_vertices;
+    struct groom_strands strands = {
+        .n_strands = n_strands, .n_vertices = n_strands * n_vertices, .first = first, .points = points};
+    groom_status st = first ? groom_light_create(&strands, &options, NULL, &light, &last) : GROOM_ENOMEM;
+    free(first);
+    return st == GROOM_OK ? light : NULL;
+}
+
+void EXPORT(engine_light_destroy)(struct groom_light *light) { groom_light_destroy(light); }

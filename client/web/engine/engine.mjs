@@ -18,12 +18,12 @@ const high = (seed) => Math.floor(seed / 4294967296) >>> 0;
 const low = (seed) => seed % 4294967296 >>> 0;
 
 export class Engine {
-    /* wasm: bytes, or a Response that is still arriving */
+    /* wasm: bytes, or a promise of a Response */
     static async load(wasm) {
         /* wasi-libc wants these for stdio, which the engine never uses */
         const refuse = () => 8;
         const imports = { wasi_snapshot_preview1: new Proxy({}, { get: () => refuse }) };
-        const { instance } = wasm instanceof Response ? await WebAssembly.instantiateStreaming(wasm, imports)
+        const { instance } = wasm instanceof Promise ? await WebAssembly.instantiateStreaming(wasm, imports)
                                                       : await WebAssembly.instantiate(wasm, imports);
         instance.exports._initialize?.();
         return new Engine(instance.exports);
@@ -80,20 +80,56 @@ export class Engine {
     }
 
     copyIn(bytes, address) { new Uint8Array(this.memory, address, bytes.length).set(bytes); }
+
+    /* Shadows within strands at an address: { size, origin, cell, data }, data as bytes of [cell][2]: how
+     * much of the key light arrives, how much of the surroundings is seen. */
+    light(points, count, vertices, { cells, width, key }) {
+        const address = this.exports.engine_light(points, count, vertices, cells, width, ...key);
+        if (!address) throw new Error(this.text(this.exports.engine_message()));
+        const head = new DataView(this.memory, address, 36), float = (at) => head.getFloat32(at, true);
+        const size = [0, 4, 8].map((at) => head.getUint32(at, true)), n = size[0] * size[1] * size[2];
+        const depth = new Float32Array(this.memory, head.getUint32(28, true), n);
+        const ambient = new Float32Array(this.memory, head.getUint32(32, true), n), data = new Uint8Array(2 * n);
+        for (let i = 0; i < n; i++) {
+            data[2 * i] = 255 * Math.exp(-depth[i]);
+            data[2 * i + 1] = 255 * Math.min(1, ambient[i]);
+        }
+        const grid = { size, origin: [float(12), float(16), float(20)], cell: float(24), data };
+        this.exports.engine_light_destroy(address);
+        return grid;
+    }
+
+    /* The same of points that are not in the engine: Float32Array [count * vertices * 3]. */
+    lightOf(points, count, vertices, options) {
+        const address = this.exports.engine_allocate(points.byteLength);
+        if (!address) throw new Error(`no memory for ${count} strands`);
+        try {
+            new Float32Array(this.memory, address, points.length).set(points);
+            return this.light(address, count, vertices, options);
+        } finally { this.exports.engine_release(address); }
+    }
 }
 
 export class Groom {
-    constructor(engine, document) {
-        this.engine = engine;
-        this.count = document.strands.count;
-        this.vertices = document.strands.vertices;
-        this.address = engine.exports.engine_groom(this.count, this.vertices, document.guides.count,
-            document.operator_guides.guide.shape[0], document.instancing.guide.shape[1]);
-        if (!this.address) throw new Error(engine.text(engine.exports.engine_message()));
+    constructor(engine, address, count, vertices) {
+        if (!address) throw new Error(engine.text(engine.exports.engine_message()));
+        Object.assign(this, { engine, address, count, vertices });
+    }
+
+    static fromDocument(engine, document) {
+        const { count, vertices } = document.strands;
+        const groom = new Groom(engine, engine.exports.engine_groom(count, vertices, document.guides.count,
+            document.operator_guides.guide.shape[0], document.instancing.guide.shape[1]), count, vertices);
         ARRAYS.forEach(([part, name], which) =>
-            engine.copyIn(bytesOf(document[part][name]), engine.exports.engine_array(this.address, which)));
-        document.operators.forEach((operator, i) => this.insert(i, operator));
-        engine.check(engine.exports.engine_validate(this.address));
+            engine.copyIn(bytesOf(document[part][name]), engine.exports.engine_array(groom.address, which)));
+        document.operators.forEach((operator, i) => groom.insert(i, operator));
+        engine.check(engine.exports.engine_validate(groom.address));
+        return groom;
+    }
+
+    /* The first strands of the fair order as a groom of their own: each evaluates as in the whole. */
+    select(count) {
+        return new Groom(this.engine, this.engine.exports.engine_select(this.address, count), count, this.vertices);
     }
 
     destroy() {
@@ -122,6 +158,11 @@ export class Groom {
         new Float32Array(this.engine.memory, this.engine.exports.engine_parameters(this.address, index), 4)[slot] = value;
     }
 
+    enable(index, operator) {
+        const seed = operator.seed ?? 1;
+        this.engine.exports.engine_identify(this.address, index, operator.id, high(seed), low(seed), operator.enabled === false ? 0 : 1);
+    }
+
     remove(index) { this.engine.check(this.engine.exports.engine_remove(this.address, index)); }
     move(from, to) { this.engine.check(this.engine.exports.engine_move(this.address, from, to)); }
 
@@ -135,6 +176,10 @@ export class Groom {
             if (!this.points) throw new Error(`no memory for ${count} strands`);
         }
         this.engine.check(exports.engine_evaluate(this.address, first, count, this.points));
+        this.shown = count;
         return new Float32Array(this.engine.memory, this.points, n);
     }
+
+    /* Engine.light within the strands of the last evaluation. */
+    light(options) { return this.engine.light(this.points, this.shown, this.vertices, options); }
 }

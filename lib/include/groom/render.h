@@ -69,6 +69,36 @@ GROOM_MUST_CHECK groom_status groom_render_strands(const struct groom_strands *s
                                                    uint8_t *rgba, const struct groom_context *context,
                                                    struct groom_diag *diag);
 
+/* --- light within hair ------------------------------------------------------------- */
+
+/* For those who draw on their own, such as the page: how much light gets to a place through the hair
+ * around it. Optical depth through a grid of hair density: to be looked up between cells' middles. */
+struct groom_light_options {
+    uint32_t cells;  /* along the longest side of the hair's box, 8..256 */
+    uint32_t stride; /* every so many-th strand counts; 1: all */
+    float width_m;   /* of a hair */
+    float key[3];    /* unit vector towards the key light */
+};
+
+struct groom_light {
+    uint32_t size[3];      /* cells; x runs fastest */
+    float origin[3], cell; /* corner of the first; edge length (m) */
+    float *key;            /* [cells] optical depth towards the key light: e^-depth of it arrives */
+    float *ambient;        /* [cells] how much of the surroundings is seen, 0..1 */
+    const struct groom_allocator *allocator;
+};
+
+/* strands  borrowed for the call; points that are not finite do not count
+ * returns  GROOM_OK, GROOM_EINVAL (options), GROOM_EEMPTY (no finite point), GROOM_ENOMEM
+ * threads  same bits for any pool */
+GROOM_MUST_CHECK groom_status groom_light_create(const struct groom_strands *strands,
+                                                 const struct groom_light_options *options,
+                                                 const struct groom_context *context, struct groom_light **light,
+                                                 struct groom_diag *diag);
+void groom_light_destroy(struct groom_light *light); /* takes NULL */
+/* At a place: the fraction of the key light and of the surroundings that reach it. */
+void groom_light_at(const struct groom_light *light, const float p[3], float *key, float *ambient);
+
 /* Encode a picture as PNG. Nothing in the bytes depends on time or machine.
  * returns  GROOM_OK, GROOM_EINVAL (a side of 0), GROOM_ENOMEM, what the sink answers */
 GROOM_MUST_CHECK groom_status groom_png_write(const uint8_t *rgba, uint32_t width, uint32_t height,

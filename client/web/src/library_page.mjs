@@ -1,0 +1,88 @@
+/* What there is: uploads to fit, jobs under way, grooms to open. */
+import { call, get, upload } from './api.mjs';
+import { action, ago, element, notice, say, whole } from './dom.mjs';
+
+const UNITS = { m: 'metres', cm: 'centimetres', mm: 'millimetres', dm: 'decimetres', in: 'inches' };
+
+/* A head of hair is 0.2 to 0.8 m: a box far from it was given another unit. */
+function unitHint({ bbox }) {
+    const size = Math.max(...bbox.max.map((high, k) => high - bbox.min[k]));
+    return size > 0.08 && size < 2.5 ? '' : ` It is ${size.toPrecision(2)} m large; hair is 0.2 to 0.8 m. Is the unit right?`;
+}
+
+/* A mesh has faces: at an OBJ's end, in a PLY's header. Everything else is for the daemon to tell. */
+async function isHead(file) {
+    if (/\.obj$/i.test(file.name)) return /^f\s/m.test(await file.slice(-65536).text());
+    return /\.ply$/i.test(file.name) && /^element\s+face/m.test(await file.slice(0, 8192).text());
+}
+
+function uploadForm(refresh) {
+    const unit = element('select', { name: 'unit' }, Object.entries(UNITS).map(([value, text]) => element('option', { value }, text)));
+    const up = element('select', { name: 'up' }, element('option', { value: 'y' }, 'y up'), element('option', { value: 'z' }, 'z up'));
+    const input = element('input', { type: 'file', multiple: true, id: 'files', onchange: () => take([...input.files]) });
+    const bar = element('progress', { max: 1, value: 0, hidden: true, 'aria-label': 'Upload' });
+    const box = element('section', { class: 'drop panel' }, element('h2', {}, 'Upload'),
+        element('p', {}, 'Drop strands (HAIR, .data, PLY, OBJ, .tfx, .npy, .npz, JSON) and a head (OBJ or PLY mesh) here, or ',
+            element('label', { for: 'files', class: 'link' }, 'choose files'), '.'), input,
+        element('div', { class: 'row' }, element('label', {}, 'unit', unit), element('label', {}, 'up axis', up)), bar);
+    const send = async (file) => {
+        const query = `unit=${unit.value}&up=${up.value}&name=${encodeURIComponent(file.name)}`;
+        return upload(`/v1/${await isHead(file) ? 'heads' : 'strands'}?${query}`, file, (done) => { bar.value = done; });
+    };
+    const take = async (files) => {
+        bar.hidden = false;
+        for (const file of files) {
+            try {
+                const made = await send(file);
+                say(`${file.name}: ${made.id.startsWith('head_') ? 'a head' : `${whole(made.strands)} strands`}.${unitHint(made)}`);
+            } catch (error) { notice(error); }
+        }
+        bar.hidden = true;
+        refresh();
+    };
+    for (const name of ['dragenter', 'dragover']) box.addEventListener(name, (e) => { e.preventDefault(); box.classList.add('over'); });
+    for (const name of ['dragleave', 'drop']) box.addEventListener(name, (e) => { e.preventDefault(); box.classList.remove('over'); });
+    box.addEventListener('drop', (e) => take([...e.dataTransfer.files]));
+    return box;
+}
+
+function strandsList(strands, heads) {
+    const head = element('select', { 'aria-label': 'Head for the fit' }, element('option', { value: '' }, 'no head'),
+        heads.map((h) => element('option', { value: h.id }, h.name || h.id)));
+    if (heads.length) head.value = heads[0].id;
+    const quality = element('select', { 'aria-label': 'Quality' }, ['draft', 'standard', 'high'].map((q) => element('option', { selected: q === 'standard' }, q)));
+    const fit = async (id) => {
+        const { json } = await call('POST', '/v1/jobs', { body: { kind: 'fit', strands: id, ...(head.value && { head: head.value }), options: { quality: quality.value } } });
+        location.hash = `#/jobs/${json.id}`;
+    };
+    return element('section', { class: 'panel' }, element('h2', {}, 'Strands'),
+        strands.length ? element('div', { class: 'row' }, 'Fit with', head, quality) : element('p', {}, 'None yet.'),
+        element('ul', { class: 'rows' }, strands.map((s) => element('li', {}, element('span', {}, element('b', {}, s.name || s.id),
+            ` ${whole(s.strands)} strands, ${ago(s.created_at)}`), action('fit', () => fit(s.id), { 'aria-label': `fit ${s.name || s.id}` })))));
+}
+
+const jobsList = (jobs) => element('section', { class: 'panel' }, element('h2', {}, 'Jobs'),
+    jobs.length ? null : element('p', {}, 'None yet.'),
+    element('ul', { class: 'rows' }, jobs.map((job) => element('li', { class: job.state },
+        element('a', { href: `#/jobs/${job.id}` }, `${job.kind}, ${ago(job.created_at)}`),
+        element('span', {}, job.state === 'running' ? job.stage?.name ?? '' : job.state),
+        element('progress', { max: 1, value: job.progress, 'aria-label': `Progress of ${job.id}` })))));
+
+const groomsList = (grooms) => element('section', { class: 'grooms' }, element('h2', {}, 'Grooms'),
+    grooms.length ? null : element('p', {}, 'None yet. Upload strands and fit them; ', element('code', {}, 'groomctl sample'), ' makes some.'),
+    element('ul', {}, grooms.map((groom) => element('li', {}, element('a', { href: `#/grooms/${groom.id}` },
+        element('img', { src: `/v1/grooms/${groom.id}/preview.png?size=256&revision=${groom.revision}`, alt: '', width: 256, height: 256, loading: 'lazy' }),
+        element('b', {}, groom.name || groom.id), element('span', {}, `revision ${groom.revision}, ${ago(groom.changed_at)}`))))));
+
+export async function libraryPage(main) {
+    const refresh = async () => {
+        const [{ strands }, { heads }, { jobs }, { grooms }] = await Promise.all(
+            ['/v1/strands?limit=30', '/v1/heads?limit=30', '/v1/jobs?limit=20', '/v1/grooms?limit=60'].map(get));
+        lists.replaceChildren(groomsList(grooms), strandsList(strands, heads), jobsList(jobs));
+    };
+    const lists = element('div', { class: 'lists' });
+    main.replaceChildren(element('div', { class: 'library' }, uploadForm(() => refresh().catch(notice)), lists));
+    say('');
+    await refresh();
+    return () => {};
+}

@@ -1,0 +1,51 @@
+/* Strands and heads as the daemon has them, ready to be shown. */
+import { BufferGeometry, Float32BufferAttribute } from 'three';
+import { OBJLoader } from 'three/addons/loaders/OBJLoader.js';
+import { PLYLoader } from 'three/addons/loaders/PLYLoader.js';
+import { bytes, get } from './api.mjs';
+
+/* USC .data of strands of one vertex count -> { points, count, vertices } with a Hair's room at the ends. */
+function parse(buffer) {
+    const view = new DataView(buffer), count = view.getInt32(0, true), vertices = view.getInt32(4, true);
+    const points = new Float32Array(3 + 3 * count * vertices + 6), stride = 4 + 12 * vertices;
+    for (let s = 0; s < count; s++)
+        points.set(new Float32Array(buffer.slice(8 + s * stride, 4 + (s + 1) * stride)), 3 + 3 * s * vertices);
+    return { points, count, vertices };
+}
+
+/* So many of an upload's strands, evenly resampled. */
+export const fetchStrands = async (id, count, vertices) =>
+    parse(await bytes(`/v1/strands/${id}/data?format=data&count=${count}&vertices=${vertices}`));
+
+/* (x, y, z) with z up is (x, z, -y) here. */
+function intoMetres(positions, unit_m, up) {
+    for (let i = 0; i < positions.length; i += 3) {
+        const [x, y, z] = [positions[i] * unit_m, positions[i + 1] * unit_m, positions[i + 2] * unit_m];
+        positions[i] = x;
+        positions[i + 1] = up === 'z' ? z : y;
+        positions[i + 2] = up === 'z' ? -y : z;
+    }
+}
+
+function geometryOf(format, buffer) {
+    if (format === 'ply') return new PLYLoader().parse(buffer);
+    const parts = [];
+    new OBJLoader().parse(new TextDecoder().decode(buffer)).traverse((part) => part.isMesh && parts.push(part.geometry.getAttribute('position').array));
+    const positions = new Float32Array(parts.reduce((n, part) => n + part.length, 0));
+    parts.reduce((at, part) => { positions.set(part, at); return at + part.length; }, 0);
+    return new BufferGeometry().setAttribute('position', new Float32BufferAttribute(positions, 3));
+}
+
+export async function fetchHead(id) {
+    const [{ format, unit_m, up }, buffer] = await Promise.all([get(`/v1/heads/${id}`), bytes(`/v1/heads/${id}/data`)]);
+    const geometry = geometryOf(format, buffer);
+    intoMetres(geometry.getAttribute('position').array, unit_m, up);
+    return geometry;
+}
+
+/* An array of a document: { dtype, shape, data }. */
+export function arrayOf({ dtype, data }) {
+    const text = atob(data), raw = new Uint8Array(text.length);
+    for (let i = 0; i < text.length; i++) raw[i] = text.charCodeAt(i);
+    return dtype === 'u32' ? new Uint32Array(raw.buffer) : new Float32Array(raw.buffer);
+}

@@ -1,0 +1,181 @@
+/* The picture: head, groom, target and guides under one camera. Draws when something has changed. */
+import * as THREE from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { Hair } from './hair.mjs';
+
+const FIELD_OF_VIEW = 20, MARGIN = 1.12;
+export const VIEWS = { front: [0, 0, 1], side: [1, 0, 0], back: [0, 0, -1], top: [0, 1, 0.001] };
+export const COMPARISONS = ['groom', 'target', 'side by side', 'overlay', 'wipe'];
+
+export class Viewer {
+    constructor(parent) {
+        this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+        this.canvas = this.renderer.domElement;
+        this.canvas.tabIndex = 0;
+        this.canvas.setAttribute('aria-label', 'The groom. Drag to turn, wheel to come closer, 1 to 4 for the views.');
+        parent.append(this.canvas);
+        this.renderer.autoClear = false;
+        this.scene = new THREE.Scene();
+        this.camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
+        this.controls = new OrbitControls(this.camera, this.canvas);
+        this.controls.addEventListener('change', () => this.draw());
+        this.box = new THREE.Box3(new THREE.Vector3(-0.1, 1.5, -0.1), new THREE.Vector3(0.1, 1.8, 0.1));
+        this.groom = this.#hair();
+        this.target = this.#hair([0.24, 0.17, 0.11]);
+        this.guides = new THREE.Group();
+        this.scene.add(this.guides, new THREE.HemisphereLight(0xdfe6f2, 0x60534a, 2.2));
+        this.comparison = 'groom';
+        this.wipe = 0.5;
+        this.background = new THREE.Color(0x23262b);
+        this.observer = new ResizeObserver(() => this.resize());
+        this.observer.observe(parent);
+        this.canvas.addEventListener('keydown', (event) => {
+            const name = Object.keys(VIEWS)[Number(event.key) - 1];
+            if (name) this.look(name);
+        });
+        this.look('front');
+    }
+
+    #hair(color) {
+        const hair = new Hair(color);
+        hair.visible = false;
+        this.scene.add(hair);
+        return hair;
+    }
+
+    /* --- what is shown ------------------------------------------------------ */
+
+    frame(box) {
+        this.box = box;
+        for (const hair of [this.groom, this.target]) this.#fit(hair);
+    }
+
+    #fit(hair) {
+        if (hair.count) hair.material.uniforms.width.value = Hair.widthOf(this.diagonal, hair.count);
+    }
+
+    get diagonal() { return this.box.getSize(new THREE.Vector3()).length(); }
+
+    show(hair, strands) {
+        hair.show(strands);
+        this.#fit(hair);
+        this.draw();
+    }
+
+    setHead(geometry) {
+        if (this.head) this.scene.remove(this.head);
+        geometry.computeVertexNormals();
+        this.head = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({ color: 0xa07864, roughness: 0.75, side: THREE.DoubleSide }));
+        this.scene.add(this.head);
+        this.draw();
+    }
+
+    /* Polylines [count][vertices][3]; chosen: indices drawn in the other colour. */
+    setGuides({ points, count, vertices }, chosen = new Set()) {
+        this.guides.clear();
+        for (const [own, color] of [[(i) => !chosen.has(i), 0x5fb4ff], [(i) => chosen.has(i), 0xffb454]]) {
+            const ends = [];
+            for (let g = 0; g < count; g++)
+                for (let j = 0; own(g) && j + 1 < vertices; j++)
+                    for (let k = 0; k < 6; k++) ends.push(points[3 * (g * vertices + j) + k]);
+            const geometry = new THREE.BufferGeometry().setAttribute('position', new THREE.Float32BufferAttribute(ends, 3));
+            this.guides.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color, transparent: true, opacity: 0.85 })));
+        }
+        this.draw();
+    }
+
+    /* --- camera -------------------------------------------------------------- */
+
+    look(name) {
+        const direction = new THREE.Vector3(...VIEWS[name]).normalize();
+        const centre = this.box.getCenter(new THREE.Vector3()), size = this.box.getSize(new THREE.Vector3());
+        const narrow = Math.min(1, this.camera.aspect), half = 0.5 * MARGIN * Math.max(size.y, Math.max(size.x, size.z) / narrow);
+        const distance = half / Math.tan((FIELD_OF_VIEW * Math.PI) / 360) + 0.5 * Math.max(size.x, size.z);
+        this.camera.position.copy(centre).addScaledVector(direction, distance);
+        this.controls.target.copy(centre);
+        this.camera.near = distance / 50;
+        this.camera.far = distance * 10;
+        this.camera.updateProjectionMatrix();
+        this.controls.update();
+        this.draw();
+    }
+
+    /* A key light from the upper left, a rim from above and behind, as in the daemon's pictures; they
+     * stand with the front view, so that shadows hold while the camera turns. */
+    static KEY = new THREE.Vector3(-0.45, 0.65, 0.62).normalize();
+    static RIM = new THREE.Vector3(0.55, 0.6, -0.58).normalize();
+
+    resize() {
+        const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+        if (!width || !height) return;
+        this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
+        this.renderer.setSize(width, height);
+        this.draw();
+    }
+
+    /* --- drawing --------------------------------------------------------------- */
+
+    draw() {
+        if (this.waiting) return;
+        this.waiting = requestAnimationFrame(() => {
+            this.waiting = 0;
+            this.#render();
+        });
+    }
+
+    #part(left, width, groom, target, { shifted = false } = {}) {
+        const size = this.renderer.getSize(new THREE.Vector2()), x = left * size.x, w = width * size.x;
+        const seen = shifted ? w : size.x;
+        this.renderer.setViewport(shifted ? x : 0, 0, seen, size.y);
+        this.renderer.setScissor(x, 0, w, size.y);
+        this.camera.aspect = seen / size.y;
+        this.camera.fov = shifted ? this.#fovFor(seen / size.y, size.x / size.y) : FIELD_OF_VIEW;
+        this.camera.updateProjectionMatrix();
+        for (const [hair, on] of [[this.groom, groom], [this.target, target]]) {
+            const { uniforms } = hair.material;
+            hair.visible = on && hair.count > 0;
+            uniforms.pixel.value = 2 * Math.tan((FIELD_OF_VIEW * Math.PI) / 360) / (size.y * this.renderer.getPixelRatio());
+            uniforms.keyDirection.value.copy(Viewer.KEY);
+            uniforms.rimDirection.value.copy(Viewer.RIM);
+        }
+        this.renderer.render(this.scene, this.camera);
+    }
+
+    /* A narrow part shows as much of the hair as the whole width did. */
+    #fovFor(narrow, wide) {
+        const size = this.box.getSize(new THREE.Vector3()), across = Math.max(size.x, size.z);
+        const step = Math.max(size.y, across / narrow) / Math.max(size.y, across / wide);
+        return (360 / Math.PI) * Math.atan(step * Math.tan((FIELD_OF_VIEW * Math.PI) / 360));
+    }
+
+    #render() {
+        this.renderer.setScissorTest(true);
+        const size = this.renderer.getSize(new THREE.Vector2());
+        this.renderer.setScissor(0, 0, size.x, size.y);
+        this.renderer.setClearColor(this.background);
+        this.renderer.clear();
+        switch (this.target.count ? this.comparison : 'groom') {
+        case 'target': this.#part(0, 1, false, true); break;
+        case 'overlay': this.#part(0, 1, true, true); break;
+        case 'side by side':
+            this.#part(0, 0.5, false, true, { shifted: true });
+            this.#part(0.5, 0.5, true, false, { shifted: true });
+            break;
+        case 'wipe':
+            this.#part(0, this.wipe, false, true);
+            this.#part(this.wipe, 1 - this.wipe, true, false);
+            break;
+        default: this.#part(0, 1, true, false);
+        }
+    }
+
+    dispose() {
+        cancelAnimationFrame(this.waiting);
+        this.observer.disconnect();
+        this.controls.dispose();
+        this.groom.dispose();
+        this.target.dispose();
+        this.renderer.dispose();
+        this.canvas.remove();
+    }
+}

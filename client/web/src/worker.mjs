@@ -1,0 +1,53 @@
+/* The engine's thread: holds the groom, answers with strands. Requests are { id, name, ...arguments };
+ * answers { id, value } or { id, error }. Arrays in answers are handed over, not copied. */
+import { Engine, Groom } from '../engine/engine.mjs';
+
+const engine = Engine.load(fetch('/studio/engine.wasm'));
+let whole = null, shown = null;
+
+function choose(count) {
+    const n = Math.max(1, Math.min(count, whole.count));
+    if (shown && shown !== whole) shown.destroy();
+    shown = n === whole.count ? whole : whole.select(n);
+}
+
+const both = (work) => { work(whole); if (shown !== whole) work(shown); };
+
+const calls = {
+    async open({ document, count }) {
+        const loaded = await engine;
+        if (shown && shown !== whole) shown.destroy();
+        whole?.destroy();
+        whole = shown = null;
+        whole = Groom.fromDocument(loaded, document);
+        choose(count);
+        return { types: loaded.types, count: whole.count, vertices: whole.vertices };
+    },
+    choose: ({ count }) => choose(count),
+    set: async ({ index, type, parameter, value }) => {
+        const known = (await engine).typeOf(type);
+        both((groom) => groom.set(index, known, parameter, value));
+    },
+    enable: ({ index, operator }) => both((groom) => groom.enable(index, operator)),
+    evaluate() {
+        const from = performance.now(), points = shown.evaluate();
+        const value = { count: shown.count, vertices: shown.vertices, ms: performance.now() - from };
+        /* one vertex of room before and two behind, for the ends of the ribbons */
+        value.points = new Float32Array(points.length + 9);
+        value.points.set(points, 3);
+        return value;
+    },
+    light: async ({ strands, ...options }) => (strands
+        ? (await engine).lightOf(strands.points.subarray(3, -6), strands.count, strands.vertices, options)
+        : shown.light(options)),
+};
+
+self.onmessage = async ({ data: { id, name, ...given } }) => {
+    try {
+        const value = await calls[name](given);
+        const handed = [value?.points, value?.data].filter(Boolean).map((array) => array.buffer);
+        self.postMessage({ id, value }, handed);
+    } catch (error) {
+        self.postMessage({ id, error: { message: error.message, pointer: error.pointer } });
+    }
+};

@@ -1,0 +1,97 @@
+// The studio, as a groomer uses it: upload, fit, turn a knob, undo, take the result home; and what is
+// taken home is what was shown.
+import test from 'node:test';
+import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { build, startDaemon, temporaryFolder } from '../support/daemon.mjs';
+import { hasBrowser, picture, startBrowser } from '../support/browser.mjs';
+
+const skip = hasBrowser ? false : 'SKIPPED: /usr/bin/chromium is not installed';
+
+function sample(t) {
+  const folder = temporaryFolder(t);
+  spawnSync(join(build, 'groomctl'), ['sample', '-o', folder, '--style', 'curly', '--strands', '400', '--vertices', '48', '--guides', '40']);
+  return folder;
+}
+
+/** The strands that the page shows, [count * vertices * 3]. */
+const shown = (page) => page.evaluate(() => Array.from(window.studio.evaluation.strands.points.slice(3, -6)));
+
+/** Waits until the page has settled on a revision. */
+const settled = (page, revision) => page.waitForFunction((r) => window.studio?.session.revision === r && !window.studio.evaluation.running, revision);
+
+/** How many pixels of the canvas differ from its background by more than a little. */
+const drawn = (page) => page.evaluate(() => {
+  const source = document.querySelector('.picture canvas'), copy = document.createElement('canvas');
+  [copy.width, copy.height] = [source.width, source.height];
+  const context = copy.getContext('2d');
+  context.drawImage(source, 0, 0);
+  const { data } = context.getImageData(0, 0, copy.width, copy.height);
+  let n = 0;
+  for (let i = 0; i < data.length; i += 4) n += Math.abs(data[i] - data[0]) + Math.abs(data[i + 1] - data[1]) > 24;
+  return n / (data.length / 4);
+});
+
+test('from files to a groom, a knob, back, and home', { skip, timeout: 300000 }, async (t) => {
+  const daemon = await startDaemon(t), folder = sample(t), page = await startBrowser(t, daemon);
+  await page.goto(daemon.url);
+  await page.setInputFiles('#files', [join(folder, 'strands.hair'), join(folder, 'head.obj')]);
+  await page.getByRole('button', { name: 'fit strands.hair' }).waitFor();
+  await page.getByLabel('Head for the fit').selectOption({ label: 'head.obj' });
+  await page.getByLabel('Quality').selectOption('draft');
+  await page.getByRole('button', { name: 'fit strands.hair' }).click();
+  await page.getByRole('link', { name: 'Open the groom' }).click();
+  await settled(page, 1);
+  await page.waitForFunction(() => window.studio.evaluation.lit && window.studio.viewer.head && window.studio.viewer.target.count);
+  await picture(page, 'studio-groom');
+  assert.ok(await drawn(page) > 0.1, 'the picture is not empty');
+
+  const before = await shown(page), operators = await page.evaluate(() => window.studio.session.operators.map((o) => o.type));
+  const curl = page.locator('.lil-gui .lil-gui').nth(operators.indexOf('curl'));
+  await t.test('a knob moves the hair and makes a revision', async () => {
+    await curl.locator('input[type=text], input[type=number]').first().fill('14');
+    await curl.locator('input[type=text], input[type=number]').first().press('Enter');
+    await settled(page, 2);
+    assert.notDeepEqual(await shown(page), before);
+    const { operators: held } = await (await daemon.fetch(`/v1/grooms/${await page.evaluate(() => window.studio.session.id)}?arrays=false`)).json();
+    assert.ok(Math.abs(held.find((o) => o.type === 'curl').radius - 0.014) < 1e-6);
+  });
+  await t.test('undo brings the strands back, redo the knob', async () => {
+    const turned = await shown(page);
+    await page.getByRole('button', { name: 'undo' }).click();
+    await settled(page, 3);
+    assert.deepEqual(await shown(page), before);
+    await page.getByRole('button', { name: 'redo' }).click();
+    await settled(page, 4);
+    assert.deepEqual(await shown(page), turned);
+  });
+  await t.test('what is downloaded is what is shown', async () => {
+    await page.locator('select[name=format]').selectOption('data');
+    await page.locator('select[name=unit]').selectOption('m');
+    const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('link', { name: 'Download' }).click()]);
+    const bytes = readFileSync(await download.path()), points = await shown(page), file = [];
+    for (let at = 4; at < bytes.length;) {
+      const n = bytes.readInt32LE(at);
+      at += 4;
+      for (let i = 0; i < 3 * n; i++, at += 4) file.push(bytes.readFloatLE(at));
+    }
+    assert.deepEqual(file, points);
+    assert.match(await page.locator('.line code').first().textContent(), /^curl 'http:.*format=data/);
+  });
+  await t.test('target and groom stand side by side', async () => {
+    await page.getByLabel('compare').selectOption('side by side');
+    await page.getByLabel(/^guides/).check();
+    await page.waitForTimeout(500);
+    await picture(page, 'studio-side-by-side');
+  });
+});
+
+test('a file that is none is refused in words', { skip, timeout: 120000 }, async (t) => {
+  const daemon = await startDaemon(t), page = await startBrowser(t, daemon);
+  await page.goto(daemon.url);
+  page.removeAllListeners('console'); /* the refused call itself is told there */
+  await page.setInputFiles('#files', { name: 'holiday.jpg', mimeType: 'image/jpeg', buffer: Buffer.from('not hair at all') });
+  await page.locator('#notices p').filter({ hasText: /.{20}/ }).waitFor();
+});
