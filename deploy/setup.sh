@@ -1,5 +1,6 @@
 #!/bin/sh
 # Installs the Debian packages of deploy/packages.txt that are missing, and Node.js for the tests.
+#   deploy/setup.sh [LIST]    another list of this folder
 # Says what it installs; asks for sudo where it is not root; does nothing on a machine that has all.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
@@ -7,7 +8,7 @@ here=$(cd "$(dirname "$0")" && pwd)
 installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q '^install ok installed$'; }
 
 missing=
-for package in $(sed 's/#.*//' "$here/packages.txt"); do
+for package in $(sed 's/#.*//' "$here/${1:-packages.txt}"); do
     installed "$package" || missing="$missing $package"
 done
 
@@ -25,6 +26,8 @@ if [ "$(id -u)" -ne 0 ]; then
 fi
 echo "setup: installing Debian packages:$missing"
 export DEBIAN_FRONTEND=noninteractive
+# what is installed for a test is not started as a service
+export RUNLEVEL=1
 $as_root apt-get update -q
 # shellcheck disable=SC2086
 $as_root apt-get install -q -y --no-install-recommends $missing

@@ -135,6 +135,8 @@ static groom_status create_launcher(struct daemon *daemon, struct groom_diag *di
         return groom_fail(diag, GROOM_EINVAL, "--launcher %.60s: there are local and slurm", config->launcher);
     daemon->worker_argv[2] = "--watched";
     daemon->worker_env[0] = WORK_ENV_PATIENCE "=900";
+    if (config->work_folder[0] && config->work_folder[0] != '/')
+        return groom_fail(diag, GROOM_EINVAL, "--work-folder %.60s: name the whole path", config->work_folder);
     if (config->work_folder[0]) {
         snprintf(daemon->node_logs, sizeof daemon->node_logs, "%.1000s/logs", config->work_folder);
         char blobs[PATH_SIZE];
