@@ -3,6 +3,9 @@
 #   make            groomd, groom-worker, groomctl and libgroom in build/
 #   make run        a daemon that has fitted the bundled sample, and the address to open
 #   make test       lint, unit, property, fuzz corpus, API and end-to-end tests
+#   make test-cluster  fits on a Slurm cluster of two nodes on loopback (installs slurm-wlm and munge)
+#   make test-deploy   the Debian package, the systemd unit, nginx in front (installs nginx)
+#   make deb        build/groomd_VERSION_ARCH.deb
 #   make bench      a table of figures, and build/bench.json
 #   make real-captures  fits of real captures: pictures and reports (CAPTURES names their folder)
 #   make asan tsan  the tests under AddressSanitizer and ThreadSanitizer
@@ -59,7 +62,7 @@ PROGRAM_OF_server_groomd.c = groomd
 PROGRAM_OF_server_worker_main.c = groom-worker
 PROGRAM_OF_client_groomctl_main.c = groomctl
 
-.PHONY: all setup programs lib run test unit check-all bench real-captures asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
+.PHONY: all setup programs lib run test unit check-all test-cluster test-deploy deb bench real-captures asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
 .DEFAULT_GOAL := all
 
 all: setup
@@ -147,6 +150,21 @@ unit: programs tests
 
 api e2e: programs node-packages
 	@BUILD=$(BUILD) tests/run.sh $@
+
+# Not part of `make test`: it installs what most machines do not have.
+test-cluster: setup
+	@deploy/setup.sh packages-cluster.txt
+	+@$(SUBMAKE) programs node-packages
+	@BUILD=$(BUILD) tests/run.sh cluster
+
+test-deploy: setup
+	@deploy/setup.sh packages-deploy.txt
+	+@$(SUBMAKE) programs node-packages
+	@BUILD=$(BUILD) tests/run.sh deploy
+
+deb: setup
+	+@$(SUBMAKE) programs
+	@BUILD=$(BUILD) deploy/debian/build.sh
 
 node-packages: tests/node_modules/.installed
 %/node_modules/.installed: %/package.json %/package-lock.json
