@@ -31,6 +31,7 @@ struct entry {
     int64_t due_ms;               /* ENTRY_NEW: when to submit */
     bool stopping, stop_due;
     enum launch_stop stop;
+    bool missed;                  /* by the last squeue */
     bool unknown;
     char words[SLURM_WORDS_SIZE];
     struct entry *next;
@@ -242,6 +243,9 @@ static void apply_row(struct entry *entry, const struct slurm_row *row)
 {
     if (!row && entry->state == ENTRY_DOUBTED && entry->order) {
         submit_again(entry, 0); /* it was not accepted */
+    } else if (!row && !entry->missed) {
+        entry->missed = true; /* once may be a controller that is just starting */
+        return;
     } else if (!row) {
         end_entry(entry, true, "gone: Slurm does not know it (any more)");
     } else if (!slurm_row_lives(row)) {
@@ -254,6 +258,7 @@ static void apply_row(struct entry *entry, const struct slurm_row *row)
     } else {
         entry->state = ENTRY_THERE;
     }
+    entry->missed = false;
 }
 
 /* What a former daemon left and nobody wants: fenced off anyway, it would only take a place. */
@@ -299,7 +304,7 @@ static bool is_asked_for(const char *names, const char *name)
 static int64_t until_next_look(struct slurm *s)
 {
     for (struct entry *entry = s->entries; entry; entry = entry->next)
-        if (entry->stopping && entry->state != ENTRY_ENDED && s->interval_ms > SOON_MS)
+        if ((entry->stopping || entry->missed) && entry->state != ENTRY_ENDED && s->interval_ms > SOON_MS)
             return SOON_MS;
     return s->interval_ms;
 }
