@@ -13,6 +13,7 @@
 #include "base/memory.h"
 #include "base/progress.h"
 #include "fit/dense.h"
+#include "fit/gather.h"
 #include "fit/loss_determinant.h"
 #include "fit/matching.h"
 #include "groom/strands.h"
@@ -290,32 +291,6 @@ out:
 
 struct losses { double spectra, segments, shape, scale, clump; };
 
-/* The groom's strands and the target's, in metres; both resampled alike. */
-static groom_status gather(const struct groom_fit *fit, const uint32_t *strand, uint32_t n, float (*fitted)[3],
-                           float (*target)[3], const struct groom_context *context, struct groom_diag *diag)
-{
-    struct groom *groom = NULL;
-    struct groom_strands *evaluated = NULL;
-    groom_status st;
-    if ((st = groom_select(fit->groom, strand, n, context, &groom, diag)) != GROOM_OK ||
-        (st = groom_strands_create(n, (uint64_t)n * fit->m, context, &evaluated, diag)) != GROOM_OK)
-        goto out;
-    for (uint32_t i = 0; i <= n; i++)
-        evaluated->first[i] = i * fit->m;
-    if ((st = groom_evaluate(groom, 0, n, evaluated->points, context, diag)) != GROOM_OK ||
-        (st = groom_strands_resample(evaluated, fit->m, fitted, context, diag)) != GROOM_OK)
-        goto out;
-    for (uint32_t i = 0; i < n; i++)
-        for (uint32_t j = 0; j < fit->m; j++)
-            for (int c = 0; c < 3; c++)
-                target[(size_t)i * fit->m + j][c] =
-                    fit->target[(size_t)strand[i] * fit->m + j][c] * fit->scale + fit->centre[c];
-out:
-    groom_strands_destroy(evaluated);
-    groom_destroy(groom);
-    return st;
-}
-
 struct yardstick {
     uint32_t n_shape, n_batches, n_batch, n;  /* n: strands in all */
     uint32_t *strand;                         /* [n] n_shape, then the batches */
@@ -383,7 +358,7 @@ static groom_status measure_losses(const struct groom_fit *fit, struct losses *l
     if (!y.strand || !y.fitted || !y.target)
         groom_fail(diag, st, "no memory to measure the losses of %u strands", y.n);
     else if ((st = choose_strands(fit, &y, context, diag)) == GROOM_OK &&
-             (st = gather(fit, y.strand, y.n, y.fitted, y.target, context, diag)) == GROOM_OK)
+             (st = gather_strands(fit, y.strand, y.n, y.fitted, y.target, context, diag)) == GROOM_OK)
         st = compare(fit, &y, losses, context, diag);
     memory_release(allocator, y.strand, y.n, sizeof *y.strand);
     memory_release(allocator, y.fitted, n_points, sizeof *y.fitted);

@@ -52,7 +52,8 @@ struct fit_stage {
     X(initialize, 1.0)                                                                                       \
     X(instance_weights, 0.3)                                                                                 \
     X(guides, 0.5)                                                                                               \
-    X(operators, 2.0)
+    X(operators, 2.0)                                                                                        \
+    X(randoms, 2.0)
 
 enum {
 #define FIT_STAGE_INDEX(name, weight) FIT_STAGE_##name,

@@ -93,6 +93,11 @@ struct groom_fit_options {
             uint32_t batches, batches_late; /* 5, and 50 in the last quarter */
         } operators;
         struct {
+            uint32_t rounds;            /* over the chain; 0 leaves the numbers as they were drawn */
+            uint32_t values;            /* of a strand's number that are tried over its range */
+            uint32_t strands;           /* of an operator guide that are asked about its curl */
+            double lambda_x;            /* of vertices over directions: 3 */
+            double hold;                /* of the instancing weights to where they are */
             uint32_t iterations;        /* 3000 */
             double learning_rate;       /* 0.1 */
             double lambda_d, lambda_l;  /* Eq. 19: 2, 0.01 */

@@ -1,0 +1,28 @@
+#include "fit/gather.h"
+
+#include "groom/strands.h"
+
+groom_status gather_strands(const struct groom_fit *fit, const uint32_t *strand, uint32_t n, float (*fitted)[3],
+                            float (*target)[3], const struct groom_context *context, struct groom_diag *diag)
+{
+    struct groom *groom = NULL;
+    struct groom_strands *evaluated = NULL;
+    groom_status st;
+    if ((st = groom_select(fit->groom, strand, n, context, &groom, diag)) != GROOM_OK ||
+        (st = groom_strands_create(n, (uint64_t)n * fit->m, context, &evaluated, diag)) != GROOM_OK)
+        goto out;
+    for (uint32_t i = 0; i <= n; i++)
+        evaluated->first[i] = i * fit->m;
+    if ((st = groom_evaluate(groom, 0, n, evaluated->points, context, diag)) != GROOM_OK ||
+        (st = groom_strands_resample(evaluated, fit->m, fitted, context, diag)) != GROOM_OK)
+        goto out;
+    for (uint32_t i = 0; i < n; i++)
+        for (uint32_t j = 0; j < fit->m; j++)
+            for (int c = 0; c < 3; c++)
+                target[(size_t)i * fit->m + j][c] =
+                    fit->target[(size_t)strand[i] * fit->m + j][c] * fit->scale + fit->centre[c];
+out:
+    groom_strands_destroy(evaluated);
+    groom_destroy(groom);
+    return st;
+}

@@ -1,0 +1,227 @@
+#include "fit/random_block.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/memory.h"
+
+/* --- life ------------------------------------------------------------------------------- */
+
+static size_t memory_lanes(uint32_t m) { return (size_t)(4 + 3 + 3 * RANDOM_BLOCK_WEIGHTS) * m + STRAND_ERROR_SCRATCH(m); }
+
+groom_status random_block_memory_init(struct random_search_memory *memory, uint32_t m, uint32_t n_active,
+                                      const struct groom_allocator *allocator)
+{
+    groom_status st = workspace_init(&memory->w, m, n_active + 3, allocator);
+    if (st != GROOM_OK)
+        return st;
+    if (!(memory->memory = memory_array(allocator, memory_lanes(m), sizeof *memory->memory)))
+        return GROOM_ENOMEM;
+    memory->target.point = memory->memory;
+    memory->target.inverse_chord = memory->target.point + (size_t)3 * m;
+    memory->scratch = memory->target.inverse_chord + m;
+    memory->blend = memory->scratch + STRAND_ERROR_SCRATCH(m);
+    memory->toward = memory->blend + (size_t)3 * m;
+    return GROOM_OK;
+}
+
+void random_block_memory_finish(struct random_search_memory *memory, uint32_t m, const struct groom_allocator *allocator)
+{
+    workspace_finish(&memory->w, allocator);
+    memory_release(allocator, memory->memory, memory_lanes(m), sizeof *memory->memory);
+}
+
+/* --- the chain ----------------------------------------------------------------------------- */
+
+struct block random_block_range(uint32_t first, uint32_t n)
+{
+    uint32_t strand[LANES];
+    for (uint32_t l = 0; l < LANES; l++)
+        strand[l] = first + l;
+    return block_of(strand, n < LANES ? n : LANES);
+}
+
+static lanes *state_of(const struct random_search *search, const struct random_search_memory *memory, uint32_t index)
+{
+    return memory->w.state + (size_t)3 * search->fit->m * index;
+}
+
+static int is_left_out(const struct random_search *search, uint32_t active) { return search->leave_out >> active & 1; }
+
+static void apply(const struct random_search *search, struct random_search_memory *memory, uint32_t active,
+                  const lanes *x, lanes *y)
+{
+    groom_operator_type type = search->plan.groom->operators[search->plan.active[active]].type;
+    kernel_of(type)->forward[search->plan.variant](&memory->in[active], x, y, memory->w.scratch);
+}
+
+static void load_target(const struct random_search *search, struct random_search_memory *memory,
+                        const struct block *block)
+{
+    const struct groom_fit *fit = search->fit;
+    const float *row[LANES];
+    for (uint32_t l = 0; l < LANES; l++) {
+        const float *from = fit->target[(size_t)block->strand[l] * fit->m], *root = fit->roots[block->strand[l]];
+        float *to = memory->w.rows + (size_t)3 * fit->m * l;
+        for (uint32_t j = 0; j < fit->m; j++)
+            for (uint32_t c = 0; c < 3; c++)
+                to[3 * j + c] = from[3 * j + c] * fit->scale + (fit->centre[c] - root[c]);
+        row[l] = to;
+    }
+    block_from_rows(row, NULL, 3 * fit->m, memory->target.point);
+    strand_error_measure(fit->m, &memory->target);
+}
+
+void random_block_advance(const struct random_search *search, struct random_search_memory *memory, uint32_t from,
+                          uint32_t active)
+{
+    for (uint32_t a = from; a < active; a++) {
+        lanes *x = state_of(search, memory, a), *y = state_of(search, memory, a + 1);
+        if (is_left_out(search, a))
+            memcpy(y, x, (size_t)3 * search->fit->m * sizeof *y);
+        else
+            apply(search, memory, a, (const lanes *)x, y);
+    }
+}
+
+void random_block_load(const struct random_search *search, struct random_search_memory *memory, const struct block *block,
+                       uint32_t active)
+{
+    load_target(search, memory, block);
+    plan_load(&search->plan, block, &memory->w);
+    for (uint32_t a = 0; a < search->plan.n_active; a++)
+        memory->in[a] = plan_inputs(&search->plan, block, &memory->w, a);
+    random_block_advance(search, memory, 0, active);
+}
+
+const lanes *random_block_before(const struct random_search *search, const struct random_search_memory *memory,
+                                 uint32_t active)
+{
+    return (const lanes *)state_of(search, memory, active);
+}
+
+const lanes *random_block_start(const struct random_search *search, const struct random_search_memory *memory)
+{
+    return random_block_before(search, memory, 0);
+}
+
+static const lanes *finish(const struct random_search *search, struct random_search_memory *memory, const lanes *x,
+                           uint32_t active, uint32_t leave_out)
+{
+    lanes *y = state_of(search, memory, search->plan.n_active + 1), *z = state_of(search, memory, search->plan.n_active + 2);
+    for (uint32_t a = active; a < search->plan.n_active; a++) {
+        if (leave_out >> a & 1)
+            continue;
+        apply(search, memory, a, x, y);
+        x = (const lanes *)y;
+        lanes *swap = y;
+        y = z, z = swap;
+    }
+    return x;
+}
+
+void random_block_lengths(const struct random_search *search, struct random_search_memory *memory, uint32_t active,
+                          float *length)
+{
+    const lanes *x = finish(search, memory, random_block_before(search, memory, active), active, 0);
+    memset(length, 0, sizeof(lanes));
+    for (uint32_t j = 0; j + 1 < search->fit->m; j++, x += 3)
+        FOR_LANES(l)
+        {
+            float ex = x[3][l] - x[0][l], ey = x[4][l] - x[1][l], ez = x[5][l] - x[2][l];
+            length[l] += sqrtf(ex * ex + ey * ey + ez * ez);
+        }
+}
+
+void random_block_evaluate(const struct random_search *search, struct random_search_memory *memory, const lanes *x,
+                           uint32_t active, float *error)
+{
+    x = finish(search, memory, x, active, search->leave_out);
+    strand_error(search->plan.variant, search->fit->m, x, &memory->target, &search->weights, memory->scratch, error);
+}
+
+/* --- instancing weights ---------------------------------------------------------------------- */
+
+/* The heaviest pays: it has most to give. The others in their order. */
+static void order_weights(const float *weight, uint32_t k, uint32_t n, uint32_t *other)
+{
+    uint32_t heaviest = 0, at = 0;
+    for (uint32_t a = 1; a < k; a++)
+        if (weight[a] > weight[heaviest])
+            heaviest = a;
+    for (uint32_t a = 0; a < k && at < n; a++)
+        if (a != heaviest)
+            other[at++] = a;
+    other[n] = heaviest;
+}
+
+static const float *shape_of(const struct groom *groom, uint32_t strand, uint32_t which)
+{
+    return groom->guides[(size_t)groom->instancing_guide[(size_t)strand * groom->n_instancing + which] * groom->n_vertices];
+}
+
+void random_block_load_weights(const struct random_search *search, struct random_search_memory *memory,
+                               const struct block *block, uint32_t n)
+{
+    const struct groom *groom = search->plan.groom;
+    uint32_t k = groom->n_instancing, points = 3 * groom->n_vertices;
+    for (uint32_t l = 0; l < LANES; l++) {
+        const float *weight = groom->instancing_weight + (size_t)block->strand[l] * k;
+        order_weights(weight, k, n, memory->other[l]);
+        for (uint32_t a = 0; a <= n; a++)
+            memory->weight[a][l] = weight[memory->other[l][a]];
+    }
+    for (uint32_t a = 0; a <= n; a++) {
+        const float *row[LANES];
+        for (uint32_t l = 0; l < LANES; l++)
+            row[l] = shape_of(groom, block->strand[l], memory->other[l][a]);
+        block_from_rows(row, row, points, a < n ? memory->toward + (size_t)a * points : memory->blend);
+    }
+    for (uint32_t a = 0; a < n; a++)
+        for (uint32_t i = 0; i < points; i++)
+            FOR_LANES(l) memory->toward[(size_t)a * points + i][l] -= memory->blend[i][l];
+}
+
+const lanes *random_block_blend(const struct random_search *search, struct random_search_memory *memory, uint32_t n,
+                                lanes *more)
+{
+    uint32_t points = 3 * search->fit->m;
+    const lanes *from = random_block_start(search, memory);
+    for (uint32_t a = 0; a < n; a++, from = (const lanes *)memory->blend) {
+        const lanes *toward = (const lanes *)memory->toward + (size_t)a * points;
+        for (uint32_t i = 0; i < points; i++)
+            FOR_LANES(l) memory->blend[i][l] = from[i][l] + more[a][l] * toward[i][l];
+    }
+    return (const lanes *)memory->blend;
+}
+
+void random_block_confine(const struct random_search_memory *memory, uint32_t n, lanes *more)
+{
+    for (int l = 0; l < LANES; l++) {
+        float sum = 0, all = memory->weight[n][l], left = all;
+        for (uint32_t a = 0; a < n; a++) {
+            float weight = fmaxf(memory->weight[a][l] + more[a][l], 0);
+            all += memory->weight[a][l];
+            left -= weight - memory->weight[a][l];
+            sum += weight;
+            more[a][l] = weight - memory->weight[a][l];
+        }
+        for (uint32_t a = 0; left < 0 && sum > 0 && a < n; a++) /* the heaviest is spent: share what there is */
+            more[a][l] = (memory->weight[a][l] + more[a][l]) * (all / sum) - memory->weight[a][l];
+    }
+}
+
+void random_block_store_weights(const struct random_search *search, const struct random_search_memory *memory,
+                                const struct block *block, uint32_t n, lanes *more)
+{
+    const struct groom *groom = search->plan.groom;
+    uint32_t k = groom->n_instancing;
+    for (uint32_t l = 0; l < block->n; l++) {
+        float *weight = groom->instancing_weight + (size_t)block->strand[l] * k, given = 0;
+        for (uint32_t a = 0; a < n; a++) {
+            weight[memory->other[l][a]] = fmaxf(memory->weight[a][l] + more[a][l], 0);
+            given += more[a][l];
+        }
+        weight[memory->other[l][n]] = fmaxf(memory->weight[n][l] - given, 0);
+    }
+}

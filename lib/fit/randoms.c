@@ -1,0 +1,371 @@
+/* Stage `randoms`: the random number of each strand, for curls of each operator guide (Chang et al. 2025,
+ * Section 5.6, reached another way).
+ *
+ * The paper descends Eq. 19 by gradients, with noise on them against local minima (Eqs. 20, 21). But each
+ * strand's problem is independent of the others', has one bounded number an operator, and costs microseconds
+ * to evaluate: so all of the range is looked at (random_search.h), operator by operator along the chain, and
+ * again in the next round with what the others have found. What is brought down are Eq. 19's directions and
+ * lengths with the distances of vertices; its spectra follow, as they can be no farther apart than directions.
+ *
+ * A strand may also follow another operator guide near it, whose curl or clump it belongs to by its looks,
+ * and at the end of a round its numbers and instancing weights take Newton's steps together
+ * (random_polish.c). */
+#include <math.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/progress.h"
+#include "fit/gather.h"
+#include "fit/loss_strands.h"
+#include "fit/random_search.h"
+
+#define UNIT 0.1             /* metres on an ordinary head: what the paper's weights were made for */
+#define LOSS_STRANDS 4000    /* of which the losses are measured */
+#define SMOOTH_VALUES 24     /* of a number that the error is smooth in */
+#define HALVINGS 7           /* of the step around the best value */
+#define STEP_WORK 1200000    /* strands times values of one step: about a second */
+#define MOST_PASSES 256
+#define CANDIDATES 8         /* operator guides near a strand that it may follow */
+#define GAIN 0.1f            /* share of its error that another one must be better by */
+#define CURL_VALUES 256      /* about: values of a curl's numbers that are tried */
+#define POLISH_STEPS 3
+#define POLISH_VALUES 64     /* about: evaluations of them */
+
+/* --- the row of passes ------------------------------------------------------------------------- */
+
+/* What is looked for: which operator guide each strand follows, the numbers of strands in one operator,
+ * those of operator guides, or the last digits of all that a strand has. */
+struct pass {
+    enum { FOLLOW, STRANDS, CURLS, POLISH } kind;
+    uint32_t round;
+    uint32_t op, active; /* of STRANDS and CURLS: its index in the chain, and among those that are enabled */
+};
+
+static int has_effect(const struct groom_operator *op)
+{
+    return op->enabled && op->parameter[op->type == GROOM_OPERATOR_FRIZZ] != 0; /* sizes; the profile of a clump */
+}
+
+static int clumps(const struct groom *groom)
+{
+    int any = 0;
+    for (uint32_t o = 0; o < groom->n_operators; o++)
+        any |= groom->operators[o].type == GROOM_OPERATOR_CLUMP && has_effect(&groom->operators[o]);
+    return any && groom->n_operator_guides > 1;
+}
+
+static uint32_t list_numbers(const struct groom *groom, uint32_t round, int per_guide, struct pass *passes)
+{
+    uint32_t n = 0, active = 0;
+    for (uint32_t o = 0; o < groom->n_operators; o++) {
+        const struct groom_operator *op = &groom->operators[o];
+        if (has_effect(op) && groom_operator_random_arrays(op->type) > 0 &&
+            groom_operator_random_per_guide(op->type) == per_guide)
+            passes[n++] = (struct pass){per_guide ? CURLS : STRANDS, round, o, active};
+        active += op->enabled != 0;
+    }
+    return n;
+}
+
+/* In a round: what strands share, then whom they follow in it, then what each has of its own. */
+static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST_PASSES])
+{
+    uint32_t n = 0, n_rounds = fit->options.stages.randoms.rounds;
+    for (uint32_t round = 0; round < n_rounds && n + GROOM_FIT_MAX_OPERATORS + 2 <= MOST_PASSES; round++) {
+        uint32_t n_curls = list_numbers(fit->groom, round, 1, passes + n), begin = n;
+        n += n_curls;
+        if (n_curls > 0 || clumps(fit->groom))
+            passes[n++] = (struct pass){.kind = FOLLOW, .round = round};
+        n += list_numbers(fit->groom, round, 0, passes + n);
+        if (n > begin)
+            passes[n++] = (struct pass){.kind = POLISH, .round = round};
+    }
+    return n;
+}
+
+static uint32_t size_of(const struct groom_fit *fit, const struct pass *pass)
+{
+    return pass->kind == CURLS ? fit->groom->n_operator_guides : fit->n;
+}
+
+/* --- one step --------------------------------------------------------------------------------------- */
+
+/* Whether a scale's numbers are taken off the lengths of strands. */
+static int is_by_length(const struct groom_fit *fit, const struct pass *pass)
+{
+    return pass->kind == STRANDS && pass->round == 0 && fit->groom->operators[pass->op].type == GROOM_OPERATOR_SCALE;
+}
+
+/* In the first round: operators that were not looked at yet and are 0 on average. */
+static uint32_t leave_out(const struct groom_fit *fit, const struct pass *pass)
+{
+    uint32_t bits = 0, active = 0;
+    if (pass->round > 0 || pass->kind == POLISH || is_by_length(fit, pass))
+        return 0;
+    for (uint32_t o = 0; o < fit->groom->n_operators; o++) {
+        const struct groom_operator *op = &fit->groom->operators[o];
+        int later = pass->kind != STRANDS || o > pass->op;
+        if (later && (op->type == GROOM_OPERATOR_BEND || op->type == GROOM_OPERATOR_FRIZZ))
+            bits |= 1u << active;
+        active += op->enabled != 0;
+    }
+    return bits;
+}
+
+/* What a loss of this stage was with the numbers as they were drawn. */
+static double loss_before(const struct groom_fit *fit, const char *name)
+{
+    const struct groom_fit_report *report = &fit->report;
+    for (uint32_t i = 0; i < report->n_losses; i++)
+        if (strcmp(report->losses[i].stage, "randoms") == 0 && strcmp(report->losses[i].name, name) == 0)
+            return report->losses[i].before;
+    return 0;
+}
+
+/* Distances weigh against directions as both were with the numbers as they were drawn, so that neither is
+ * bought at the other's expense, whatever the style. */
+static struct strand_error_weights weights_of(const struct groom_fit *fit, const struct pass *pass)
+{
+    const double unit = UNIT * fit->ordinary, squared = unit * unit;
+    double lambda_d = fit->options.stages.randoms.lambda_d, vertex = loss_before(fit, "vertex");
+    double balance = vertex > 0 ? loss_before(fit, "direction") / (vertex * vertex) : 0;
+    if (is_by_length(fit, pass))
+        return (struct strand_error_weights){0, 0, (float)(1 / squared)};
+    return (struct strand_error_weights){(float)lambda_d, (float)(lambda_d * balance * fit->options.stages.randoms.lambda_x),
+                                         (float)(fit->options.stages.randoms.lambda_l / squared)};
+}
+
+/* Strands by operator guide. begin [n_gop + 1], member [n] */
+static void sort_by_guide(const struct groom *groom, uint32_t *begin, uint32_t *member)
+{
+    uint32_t n = groom->n_operator_guides;
+    memset(begin, 0, ((size_t)n + 1) * sizeof *begin);
+    for (uint32_t i = 0; i < groom->n_strands; i++)
+        begin[groom->operator_guide_of[i] + 1]++;
+    for (uint32_t o = 0; o < n; o++)
+        begin[o + 1] += begin[o];
+    for (uint32_t i = 0; i < groom->n_strands; i++)
+        member[begin[groom->operator_guide_of[i]]++] = i;
+    memmove(begin + 1, begin, n * sizeof *begin);
+    begin[0] = 0;
+}
+
+/* The active index of the scale that stands last before an operator, or UINT32_MAX. */
+static uint32_t scale_before(const struct groom *groom, uint32_t op)
+{
+    uint32_t found = UINT32_MAX, active = 0;
+    for (uint32_t o = 0; o < op; o++) {
+        if (groom->operators[o].type == GROOM_OPERATOR_SCALE && has_effect(&groom->operators[o]))
+            found = active;
+        active += groom->operators[o].enabled != 0;
+    }
+    return found;
+}
+
+static groom_status search_curls(struct groom_fit *fit, struct random_search *search, const struct pass *pass,
+                                 uint32_t count, const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    size_t n_begin = (size_t)fit->groom->n_operator_guides + 1;
+    uint32_t *begin = memory_array(allocator, n_begin, sizeof *begin);
+    uint32_t *member = memory_array(allocator, fit->n, sizeof *member);
+    groom_status st = begin && member ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to sort strands");
+    if (st == GROOM_OK) {
+        struct random_search_groups groups = {member, begin, fit->options.stages.randoms.strands, pass->round == 0,
+                                              scale_before(fit->groom, pass->op)};
+        sort_by_guide(fit->groom, begin, member);
+        random_search_curls(search, pass->active, fit->iteration, count, &groups, context);
+    }
+    memory_release(allocator, begin, n_begin, sizeof *begin);
+    memory_release(allocator, member, fit->n, sizeof *member);
+    return st;
+}
+
+static groom_status search_guides(struct groom_fit *fit, struct random_search *search, uint32_t count,
+                                  const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    struct groom *groom = fit->groom;
+    uint32_t n = groom->n_operator_guides;
+    struct groom_neighbours *index = NULL;
+    uint8_t *used = memory_array_zero(allocator, n, 1);
+    float (*uv)[2] = memory_array(allocator, n, sizeof *uv);
+    uint32_t *candidate = memory_array(allocator, (size_t)count * CANDIDATES, sizeof *candidate);
+    groom_status st = used && uv && candidate ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to choose operator guides");
+    if (st != GROOM_OK)
+        goto out;
+    for (uint32_t i = 0; i < groom->n_strands; i++)
+        used[groom->operator_guide_of[i]] = 1;
+    for (uint32_t o = 0; o < n; o++)
+        memcpy(uv[o], groom->guide_uv[groom->operator_guide[o]], sizeof uv[o]);
+    if ((st = groom_neighbours_create(uv[0], n, 2, context, &index, diag)) != GROOM_OK ||
+        (st = groom_neighbours_find(index, groom->root_uv[fit->iteration], count, CANDIDATES, candidate, NULL, context, diag)) != GROOM_OK)
+        goto out;
+    for (size_t i = 0; i < (size_t)count * CANDIDATES; i++)
+        if (candidate[i] != UINT32_MAX && !used[candidate[i]])
+            candidate[i] = UINT32_MAX;
+    random_search_guides(search, fit->iteration, count, candidate, CANDIDATES, GAIN, context);
+out:
+    groom_neighbours_destroy(index);
+    memory_release(allocator, used, n, 1);
+    memory_release(allocator, uv, n, sizeof *uv);
+    memory_release(allocator, candidate, (size_t)count * CANDIDATES, sizeof *candidate);
+    return st;
+}
+
+/* Values that are tried over the whole range: noise wants many. */
+static uint32_t grid_of(const struct groom_fit *fit, const struct pass *pass)
+{
+    uint32_t values = fit->options.stages.randoms.values;
+    int rugged = fit->groom->operators[pass->op].type == GROOM_OPERATOR_FRIZZ;
+    return rugged || values < SMOOTH_VALUES ? values : SMOOTH_VALUES;
+}
+
+/* Strands or operator guides of the next step. */
+static uint32_t step_size(const struct groom_fit *fit, const struct pass *pass)
+{
+    uint32_t values = 0, wanted, left = size_of(fit, pass) - fit->iteration;
+    switch (pass->kind) {
+    case FOLLOW: values = 2 * CANDIDATES; break;
+    case STRANDS: values = grid_of(fit, pass); break;
+    case CURLS: values = CURL_VALUES * fit->options.stages.randoms.strands; break;
+    case POLISH: values = POLISH_VALUES; break;
+    }
+    wanted = STEP_WORK / values > 1 ? STEP_WORK / values : 1;
+    return wanted < left ? wanted : left;
+}
+
+static groom_status search_pass(struct groom_fit *fit, struct random_search *search, const struct pass *pass,
+                                uint32_t count, const struct groom_context *context, struct groom_diag *diag)
+{
+    switch (pass->kind) {
+    case FOLLOW: return search_guides(fit, search, count, context, diag);
+    case STRANDS:
+        random_search_strands(search, pass->active, fit->iteration, count, grid_of(fit, pass), HALVINGS, context);
+        return GROOM_OK;
+    case CURLS: return search_curls(fit, search, pass, count, context, diag);
+    case POLISH:
+        random_search_polish(search, fit->iteration, count, POLISH_STEPS, (float)fit->options.stages.randoms.hold, context);
+        return GROOM_OK;
+    }
+    return GROOM_EINTERNAL;
+}
+
+static groom_status search_step(struct groom_fit *fit, const struct pass *pass, const struct groom_context *context,
+                                struct groom_diag *diag)
+{
+    struct random_search search;
+    uint32_t count = step_size(fit, pass);
+    groom_status st = random_search_init(&search, fit, context, diag);
+    if (st == GROOM_OK) {
+        search.leave_out = leave_out(fit, pass);
+        search.weights = weights_of(fit, pass);
+        st = search_pass(fit, &search, pass, count, context, diag);
+    }
+    random_search_finish(&search);
+    if (st == GROOM_OK)
+        fit->iteration += count;
+    return st;
+}
+
+/* --- losses -------------------------------------------------------------------------------------------- */
+
+static groom_status measure(const struct groom_fit *fit, struct loss_strands *loss, const struct groom_context *context,
+                            struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    uint32_t n = fit->n < LOSS_STRANDS ? fit->n : LOSS_STRANDS;
+    size_t n_points = (size_t)n * fit->m;
+    uint32_t *order = memory_array(allocator, fit->n, sizeof *order);
+    float (*fitted)[3] = memory_array(allocator, n_points, sizeof *fitted);
+    float (*target)[3] = memory_array(allocator, n_points, sizeof *target);
+    groom_status st = GROOM_ENOMEM;
+    if (!order || !fitted || !target) {
+        groom_fail(diag, st, "no memory to measure the losses of %u strands", n);
+        goto out;
+    }
+    groom_fair_order(fit->n, order);
+    if ((st = gather_strands(fit, order, n, fitted, target, context, diag)) == GROOM_OK)
+        st = loss_strands((const float (*)[3])fitted, (const float (*)[3])target, n, fit->m, UNIT * fit->ordinary,
+                          fit->options.stages.randoms.lambda_d, fit->options.stages.randoms.lambda_l, context, loss, diag);
+out:
+    memory_release(allocator, order, fit->n, sizeof *order);
+    memory_release(allocator, fitted, n_points, sizeof *fitted);
+    memory_release(allocator, target, n_points, sizeof *target);
+    return st;
+}
+
+/* The values before the stage go into both columns of the report; those after it into the second. */
+static void note_loss(struct groom_fit *fit, const char *name, double value, uint64_t iteration,
+                      const struct groom_context *context)
+{
+    struct groom_fit_report *report = &fit->report;
+    progress_loss(context, name, iteration, value);
+    for (uint32_t i = 0; i < report->n_losses; i++)
+        if (strcmp(report->losses[i].stage, "randoms") == 0 && strcmp(report->losses[i].name, name) == 0) {
+            report->losses[i].after = value;
+            return;
+        }
+    report_loss(report, "randoms", name, value, value);
+}
+
+static groom_status report_losses(struct groom_fit *fit, uint64_t iteration, const struct groom_context *context,
+                                  struct groom_diag *diag)
+{
+    struct loss_strands loss;
+    groom_status st = measure(fit, &loss, context, diag);
+    if (st != GROOM_OK)
+        return st;
+    note_loss(fit, "L_rand", loss.total, iteration, context);
+    note_loss(fit, "spectra", loss.spectra, iteration, context);
+    note_loss(fit, "direction", loss.direction, iteration, context);
+    note_loss(fit, "length", loss.length, iteration, context);
+    note_loss(fit, "vertex", loss.vertex, iteration, context);
+    return GROOM_OK;
+}
+
+/* --- the stage ---------------------------------------------------------------------------------------------- */
+
+/* Phase 0 measures; then comes each pass; each round ends with a measurement. */
+groom_status randoms_step(struct groom_fit *fit, int *ended, const struct groom_context *context,
+                          struct groom_diag *diag)
+{
+    struct pass passes[MOST_PASSES];
+    uint32_t n = list_passes(fit, passes);
+    groom_status st = GROOM_OK;
+    if (fit->phase == 0) {
+        if (n > 0)
+            st = report_losses(fit, 0, context, diag);
+        fit->phase += st == GROOM_OK;
+    } else if (fit->iteration < size_of(fit, &passes[fit->phase - 1])) {
+        st = search_step(fit, &passes[fit->phase - 1], context, diag);
+    } else {
+        int last = fit->phase == n || passes[fit->phase].round != passes[fit->phase - 1].round;
+        if (last)
+            st = report_losses(fit, passes[fit->phase - 1].round + 1, context, diag);
+        if (st == GROOM_OK) {
+            fit->phase++;
+            fit->iteration = 0;
+        }
+    }
+    *ended = st == GROOM_OK && fit->phase > n;
+    return st;
+}
+
+double randoms_fraction(const struct groom_fit *fit)
+{
+    struct pass passes[MOST_PASSES];
+    uint32_t n = fit->groom ? list_passes(fit, passes) : 0;
+    if (n == 0 || fit->phase == 0)
+        return 0;
+    return fmin((fit->phase - 1 + (double)fit->iteration / size_of(fit, &passes[fit->phase - 1])) / n, 1);
+}
+
+int randoms_sound(const struct groom_fit *fit)
+{
+    struct pass passes[MOST_PASSES];
+    uint32_t n = list_passes(fit, passes);
+    if (fit->groom->n_operators > GROOM_FIT_MAX_OPERATORS || fit->phase > n)
+        return 0;
+    return fit->phase == 0 ? fit->iteration == 0 : fit->iteration <= size_of(fit, &passes[fit->phase - 1]);
+}

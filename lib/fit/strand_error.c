@@ -1,0 +1,101 @@
+#include "fit/strand_error.h"
+
+#include <string.h>
+
+#include "model/arc.h"
+
+void strand_error_measure(uint32_t m, struct strand_error_target *target)
+{
+    memset(target->length, 0, sizeof target->length);
+    for (uint32_t j = 0; j + 1 < m; j++) {
+        const lanes *p = (const lanes *)target->point + (size_t)3 * j;
+        FOR_LANES(l)
+        {
+            float x = p[3][l] - p[0][l], y = p[4][l] - p[1][l], z = p[5][l] - p[2][l];
+            float length = sqrtf(x * x + y * y + z * z);
+            target->length[l] += length;
+            target->inverse_chord[j][l] = lane_inverse(length);
+        }
+    }
+}
+
+/* The target's segment that lies at a fraction of arc length, and where in it. */
+LANES_INLINE void locate(float fraction, float segments, int32_t *index, float *within)
+{
+    float at = at_most(fraction * segments, segments - 0.5f);
+    *index = (int32_t)at;
+    *within = at_most(at - (float)*index, 1.0f);
+}
+
+/* One corner of a segment a lane; each lane has a segment of its own. */
+LANES_INLINE void gather(const lanes *restrict point, const int32_t *restrict index, int offset, lanes *restrict out)
+{
+    for (int c = 0; c < 3; c++)
+        for (int l = 0; l < LANES; l++)
+            out[c][l] = point[3 * index[l] + offset + c][l];
+}
+
+LANES_INLINE void error_body(uint32_t m, const lanes *restrict x, const struct strand_error_target *restrict target,
+                             const struct strand_error_weights *weights, lanes *restrict scratch,
+                             float *restrict error)
+{
+    lanes *ell = scratch, *at = scratch + m, inverse, along = {0}, apart = {0};
+    float segments = (float)(m - 1);
+    arc_measure(m, x, ell, at, inverse);
+    for (uint32_t j = 0; j + 1 < m; j++) {
+        const lanes *p = x + (size_t)3 * j;
+        int32_t index[LANES];
+        lanes within, low[3], high[3], chord;
+        FOR_LANES(l) locate(0.5f * (at[j][l] + at[j + 1][l]) * inverse[l], segments, &index[l], &within[l]);
+        gather((const lanes *)target->point, index, 0, low);
+        gather((const lanes *)target->point, index, 3, high);
+        for (int l = 0; l < LANES; l++)
+            chord[l] = target->inverse_chord[index[l]][l];
+        FOR_LANES(l)
+        {
+            float square = 0, dot = 0;
+            for (int c = 0; c < 3; c++) {
+                float step = high[c][l] - low[c][l];
+                float off = 0.5f * (p[c][l] + p[3 + c][l]) - (low[c][l] + within[l] * step);
+                square += off * off;
+                dot += (p[3 + c][l] - p[c][l]) * step;
+            }
+            along[l] += dot * chord[l];
+            apart[l] += square * ell[j][l];
+        }
+    }
+    FOR_LANES(l)
+    {
+        float longer = at[m - 1][l] - target->length[l];
+        error[l] = weights->direction * (1.0f - along[l] * inverse[l]) + weights->vertex * (apart[l] * inverse[l]) +
+                   weights->length * (longer * longer);
+    }
+}
+
+static void error_baseline(uint32_t m, const lanes *restrict x, const struct strand_error_target *restrict target,
+                           const struct strand_error_weights *weights, lanes *restrict scratch, float *restrict error)
+{
+    error_body(m, x, target, weights, scratch, error);
+}
+
+#if defined(__x86_64__)
+KERNEL_TARGET_AVX2 static void error_avx2(uint32_t m, const lanes *restrict x,
+                                          const struct strand_error_target *restrict target,
+                                          const struct strand_error_weights *weights, lanes *restrict scratch,
+                                          float *restrict error)
+{
+    error_body(m, x, target, weights, scratch, error);
+}
+#endif
+
+void strand_error(enum kernel_variant variant, uint32_t m, const lanes *x, const struct strand_error_target *target,
+                  const struct strand_error_weights *weights, lanes *scratch, float *error)
+{
+#if defined(__x86_64__)
+    if (variant == KERNEL_AVX2) {
+        error_avx2(m, x, target, weights, scratch, error);
+        return;
+    }
+#endif
+    error_baseline(m, x, target, weights, scratch, error);
+}

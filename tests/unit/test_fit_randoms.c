@@ -1,0 +1,260 @@
+/* stage `randoms`: what a strand's error is, and that known random numbers are found again */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "fit/loss_strands.h"
+#include "fit/state.h"
+#include "fit/strand_error.h"
+#include "groom/random.h"
+#include "groom/strands.h"
+#include "tests/support/guides.h"
+#include "tests/support/test.h"
+
+enum { M = 40 };
+
+/* --- the error of a strand ------------------------------------------------------------ */
+
+/* A helix in each lane, m vertices of which stand closer towards the tip the larger `bunch` is. */
+static void helices(uint32_t m, float bunch, float shift, lanes *x)
+{
+    for (uint32_t j = 0; j < m; j++)
+        for (int l = 0; l < LANES; l++) {
+            float v = powf((float)j / (float)(m - 1), 1 - bunch), angle = 9 * v + (float)l;
+            x[3 * j][l] = 0.02f * (sinf(angle) - sinf((float)l)) + shift * v;
+            x[3 * j + 1][l] = -0.2f * v;
+            x[3 * j + 2][l] = 0.02f * (cosf(angle) - cosf((float)l));
+        }
+}
+
+static void error_of(enum kernel_variant variant, const lanes *x, lanes *target_x, struct strand_error_weights weights, lanes error)
+{
+    lanes inverse[400], scratch[STRAND_ERROR_SCRATCH(400)];
+    struct strand_error_target target = {.point = target_x, .inverse_chord = inverse};
+    strand_error_measure(400, &target);
+    strand_error(variant, 400, x, &target, &weights, scratch, error);
+}
+
+START_TEST(the_error_is_none_on_the_same_curve_however_its_vertices_stand)
+{
+    static lanes x[1200], same[1200], off[1200];
+    lanes error;
+    helices(400, 0, 0, x);
+    helices(400, 0.3f, 0, same);
+    helices(400, 0, 0.03f, off);
+    error_of(KERNEL_BASELINE, same, x, (struct strand_error_weights){1, 100, 100}, error);
+    for (int l = 0; l < LANES; l++)
+        ck_assert_float_le(fabsf(error[l]), 2e-4f);
+    error_of(KERNEL_BASELINE, off, x, (struct strand_error_weights){0, 1, 0}, error);
+    for (int l = 0; l < LANES; l++) /* the mean of (0.03 v)^2 */
+        ck_assert_float_eq_tol(error[l], 0.0003f, 0.00006f);
+}
+END_TEST
+
+START_TEST(the_error_has_the_same_bits_in_all_variants)
+{
+    static lanes x[1200], y[1200];
+    lanes one, other;
+    helices(400, 0.2f, 0.01f, x);
+    helices(400, 0, 0, y);
+    error_of(KERNEL_BASELINE, x, y, (struct strand_error_weights){2, 30, 1}, one);
+    error_of(kernel_best_variant(), x, y, (struct strand_error_weights){2, 30, 1}, other);
+    ck_assert_mem_eq(one, other, sizeof one);
+}
+END_TEST
+
+/* Two straight strands of 0.2 and 0.3 m at a right angle. */
+START_TEST(the_losses_are_those_of_their_equation)
+{
+    float a[11][3] = {{0}}, b[11][3] = {{0}};
+    struct loss_strands loss;
+    for (int j = 0; j < 11; j++)
+        a[j][1] = 0.02f * (float)j, b[j][0] = 0.03f * (float)j;
+    ck_ok(loss_strands((const float (*)[3])a, (const float (*)[3])b, 1, 11, 0.1, 2, 0.01, NULL, &loss, NULL));
+    ck_assert_double_eq_tol(loss.direction, 1, 1e-5);
+    ck_assert_double_eq_tol(loss.length, 1, 1e-5);
+    ck_assert_double_eq_tol(loss.spectra, 200, 1e-3); /* 10 segments at wave 0, once along y, once along x */
+    ck_assert_double_eq_tol(loss.vertex, 0.18028, 1e-4);
+    ck_assert_double_eq_tol(loss.total, 202.01, 1e-3);
+    ck_ok(loss_strands((const float (*)[3])a, (const float (*)[3])a, 1, 11, 0.1, 2, 0.01, NULL, &loss, NULL));
+    ck_assert_double_eq_tol(loss.total, 0, 1e-6);
+}
+END_TEST
+
+/* --- the stage ----------------------------------------------------------------------------- */
+
+/* A fit before the stage that knows all of the truth but its random numbers. */
+static struct groom_fit *fit_of(const struct groom_sample *sample, uint32_t rounds)
+{
+    struct groom_fit_options options;
+    groom_fit_options_init(GROOM_FIT_STANDARD, &options);
+    options.vertices = M;
+    options.guides = sample->truth->n_guides;
+    options.operator_guides = sample->truth->n_operator_guides;
+    options.seed = 77;
+    options.stages.randoms.rounds = rounds;
+    struct groom_fit *fit = guides_fit(sample, &options, "instance_weights", NULL);
+    struct groom *groom;
+    ck_ok(groom_clone(sample->truth, NULL, &groom, NULL));
+    for (uint32_t o = 0; o < groom->n_operators; o++)
+        groom_draw_random(groom, &groom->operators[o], options.seed);
+    groom_destroy(fit->groom);
+    fit->groom = groom;
+    fit->stage = FIT_STAGE_randoms;
+    fit->phase = fit->iteration = 0;
+    return fit;
+}
+
+static void finish(struct groom_fit *fit, const struct groom_context *context)
+{
+    while (!groom_fit_done(fit))
+        ck_ok(groom_fit_step(fit, context, NULL));
+}
+
+static const struct groom_fit_loss *loss_of(const struct groom_fit *fit, const char *name)
+{
+    const struct groom_fit_report *report = groom_fit_get_report(fit);
+    for (uint32_t i = 0; i < report->n_losses; i++)
+        if (strcmp(report->losses[i].stage, "randoms") == 0 && strcmp(report->losses[i].name, name) == 0)
+            return &report->losses[i];
+    ck_abort_msg("no loss %s", name);
+    return NULL;
+}
+
+static struct groom_context three_threads(void)
+{
+    struct groom_context context = {0};
+    ck_ok(groom_pool_create(3, &context.pool));
+    return context;
+}
+
+/* Errors fall to this share of what they are with other random numbers. */
+static void finds(groom_sample_style style, double direction, double vertex)
+{
+    struct groom_context context = three_threads();
+    struct groom_sample *sample = guides_sample(style, 600, M, 3, &context);
+    struct groom_fit *fit = fit_of(sample, 2);
+    finish(fit, &context);
+    const struct groom_fit_loss *d = loss_of(fit, "direction"), *x = loss_of(fit, "vertex"), *all = loss_of(fit, "L_rand");
+    ck_assert_msg(d->after < direction * d->before, "direction %g of %g", d->after, d->before);
+    ck_assert_msg(x->after < vertex * x->before, "vertex %g of %g", x->after, x->before);
+    ck_assert_double_lt(all->after, 0.5 * all->before);
+    ck_ok(groom_validate(fit->groom, NULL));
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+    groom_pool_destroy(context.pool);
+}
+
+START_TEST(numbers_of_bent_hair_are_found) { finds(GROOM_SAMPLE_BENT, 0.1, 0.1); } END_TEST
+START_TEST(numbers_of_spiky_hair_are_found) { finds(GROOM_SAMPLE_SPIKY, 0.1, 0.15); } END_TEST
+START_TEST(numbers_of_curls_are_found) { finds(GROOM_SAMPLE_CURLY, 0.4, 0.5); } END_TEST
+
+static void same_grooms(const struct groom *a, const struct groom *b)
+{
+    size_t n = a->n_strands;
+    for (uint32_t o = 0; o < a->n_operators; o++)
+        for (uint32_t r = 0; r < groom_operator_random_arrays(a->operators[o].type); r++)
+            ck_assert_mem_eq(a->operators[o].random[r], b->operators[o].random[r],
+                             (groom_operator_random_per_guide(a->operators[o].type) ? a->n_operator_guides : n) * sizeof(float));
+    ck_assert_mem_eq(a->instancing_weight, b->instancing_weight, n * a->n_instancing * sizeof(float));
+    ck_assert_mem_eq(a->operator_guide_of, b->operator_guide_of, n * sizeof(uint32_t));
+}
+
+START_TEST(the_stage_has_the_same_bits_for_any_threads)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_WAVY, 220, M, 3, NULL);
+    struct groom_fit *one = fit_of(sample, 2), *three = fit_of(sample, 2);
+    struct groom_context context = three_threads();
+    finish(one, NULL);
+    finish(three, &context);
+    same_grooms(one->groom, three->groom);
+    ck_assert_mem_eq(&one->report, &three->report, sizeof one->report);
+    groom_fit_destroy(one);
+    groom_fit_destroy(three);
+    groom_sample_destroy(sample);
+    groom_pool_destroy(context.pool);
+}
+END_TEST
+
+struct bytes { unsigned char *at; size_t n; };
+
+static groom_status append(void *user, const void *from, size_t n)
+{
+    struct bytes *bytes = user;
+    bytes->at = realloc(bytes->at, bytes->n + n);
+    memcpy(bytes->at + bytes->n, from, n);
+    bytes->n += n;
+    return GROOM_OK;
+}
+
+/* After each of its steps saved, and taken up by a fit that has done nothing. */
+START_TEST(the_stage_can_be_interrupted_anywhere)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_WAVY, 220, M, 3, NULL);
+    struct groom_fit *whole = fit_of(sample, 1), *other = fit_of(sample, 1);
+    int steps = 0;
+    finish(whole, NULL);
+    for (; !groom_fit_done(other); steps++) {
+        struct bytes bytes = {0};
+        ck_ok(groom_fit_step(other, NULL, NULL));
+        ck_ok(groom_fit_save(other, (struct groom_sink){append, &bytes}, NULL));
+        struct groom_memory_source memory;
+        struct groom_source source = groom_source_from_memory(&memory, bytes.at, bytes.n);
+        struct groom_fit *next = fit_of(sample, 1);
+        ck_ok(groom_fit_load(next, &source, NULL, NULL));
+        groom_fit_destroy(other);
+        other = next;
+        free(bytes.at);
+    }
+    ck_assert_int_gt(steps, 5);
+    same_grooms(whole->groom, other->groom);
+    groom_fit_destroy(whole);
+    groom_fit_destroy(other);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
+START_TEST(a_step_without_memory_changes_nothing)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_WAVY, 100, M, 3, NULL);
+    struct groom_fit *whole = fit_of(sample, 1), *poor = fit_of(sample, 1);
+    struct test_failing_allocator state;
+    struct groom_allocator allocator;
+    struct groom_context context = {.allocator = &allocator};
+    size_t fail_at = 0, failures = 0;
+    finish(whole, NULL);
+    while (!groom_fit_done(poor)) {
+        test_failing_allocator_init(&state, fail_at, &allocator);
+        groom_status st = groom_fit_step(poor, &context, NULL);
+        ck_assert_uint_eq(state.outstanding_bytes, 0);
+        failures += st != GROOM_OK;
+        ck_assert(st == GROOM_OK || st == GROOM_ENOMEM);
+        fail_at = st == GROOM_OK ? 0 : fail_at + 1;
+    }
+    ck_assert_uint_gt(failures, 20);
+    same_grooms(whole->groom, poor->groom);
+    groom_fit_destroy(whole);
+    groom_fit_destroy(poor);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
+START_TEST(no_rounds_leave_the_numbers_as_they_were_drawn)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_STRAIGHT, 100, M, 3, NULL);
+    struct groom_fit *fit = fit_of(sample, 0);
+    struct groom *before;
+    ck_ok(groom_clone(fit->groom, NULL, &before, NULL));
+    finish(fit, NULL);
+    same_grooms(before, fit->groom);
+    groom_destroy(before);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
+TEST_SUITE("fit_randoms", the_error_is_none_on_the_same_curve_however_its_vertices_stand,
+           the_error_has_the_same_bits_in_all_variants, the_losses_are_those_of_their_equation,
+           numbers_of_bent_hair_are_found, numbers_of_spiky_hair_are_found, numbers_of_curls_are_found,
+           the_stage_has_the_same_bits_for_any_threads, the_stage_can_be_interrupted_anywhere,
+           a_step_without_memory_changes_nothing, no_rounds_leave_the_numbers_as_they_were_drawn)
