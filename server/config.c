@@ -269,7 +269,9 @@ void config_help(FILE *out)
           "`listening on http://HOST:PORT`. SIGTERM and SIGINT finish what is under way and stop.\n\n"
           "Each option is also a line `name = value` of the configuration file and an environment variable\n"
           "(GROOMD_MAX_UPLOAD for --max-upload). The command line wins, then the environment, then the "
-          "file.\n\n",
+          "file.\n\n"
+          "       groomd check            is all of a data folder whole? see groomd check --help\n"
+          "       groomd backup FOLDER    a copy to start from, of a daemon that runs or not\n\n",
           out);
     for (size_t i = 0; i < N_OPTIONS; i++) {
         char left[64];

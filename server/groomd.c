@@ -27,6 +27,8 @@
 #include "server/listen.h"
 #include "server/log.h"
 #include "server/uploads/uploads.h"
+#include "server/upkeep/command.h"
+#include "server/upkeep/control.h"
 
 #define PATH_SIZE 1400
 
@@ -45,6 +47,7 @@ struct daemon {
     struct launcher *launcher;
     struct supervisor *supervisor;
     struct housekeeper *housekeeper;
+    struct control *control;
     struct service service;
     struct server *server;
 };
@@ -229,6 +232,14 @@ static groom_status start_housekeeper(struct daemon *daemon, struct groom_diag *
                              &daemon->housekeeper, diag);
 }
 
+static groom_status start_control(struct daemon *daemon, struct groom_diag *diag)
+{
+    return control_start(&(struct upkeep){.folder = daemon->config.data,
+                                          .store = daemon->store,
+                                          .blobs = daemon->blobs},
+                         &daemon->control, diag);
+}
+
 static groom_status start_server(struct daemon *daemon, struct groom_diag *diag)
 {
     daemon->service = (struct service){.config = &daemon->config,
@@ -257,13 +268,18 @@ static groom_status start(struct daemon *daemon, struct groom_diag *diag)
         (status = open_folder(daemon, diag)) != GROOM_OK || (status = open_state(daemon, diag)) != GROOM_OK ||
         (status = open_grooms(daemon, diag)) != GROOM_OK ||
         (status = start_supervisor(daemon, diag)) != GROOM_OK ||
-        (status = start_housekeeper(daemon, diag)) != GROOM_OK)
+        (status = start_housekeeper(daemon, diag)) != GROOM_OK ||
+        (status = start_control(daemon, diag)) != GROOM_OK)
         return status;
     return start_server(daemon, diag);
 }
 
 static void finish(struct daemon *daemon)
 {
+    if (!control_stop(daemon->control)) {
+        log_message(CONFIG_LOG_WARNING, "a check or a backup was cut off");
+        _exit(0);
+    }
     housekeeper_stop(daemon->housekeeper);
     server_destroy(daemon->server);
     supervisor_destroy(daemon->supervisor);
@@ -341,6 +357,8 @@ int main(int argc, char **argv)
     struct groom_diag diag = {0};
     enum config_action action;
     sigset_t signals;
+    if (argc > 1 && (!strcmp(argv[1], "check") || !strcmp(argv[1], "backup")))
+        return upkeep_command(argc - 1, argv + 1, environ);
     groom_status status = config_load(argc, argv, environ, &daemon.config, &action, &diag);
     if (status == GROOM_OK && action == CONFIG_HELP) {
         config_help(stdout);

@@ -89,6 +89,10 @@ typedef groom_status (*blobs_referenced)(void *user, const char *sha256, bool *r
 /* Remove a blob unless it is pinned or referred to; *removed says. Removing what is not there is fine. */
 GROOM_MUST_CHECK groom_status blobs_collect(struct blobs *blobs, const char *sha256, blobs_referenced referenced,
                                             void *user, bool *removed, struct groom_diag *diag);
+/* While it is held nothing is removed (a backup or a check walks the blobs); counts, so that holds nest. What
+ * would have been removed is garbage for a later collection. */
+void blobs_hold(struct blobs *blobs);
+void blobs_release(struct blobs *blobs);
 /* Collect every blob that no row refers to; counts what went. */
 GROOM_MUST_CHECK groom_status blobs_collect_all(struct blobs *blobs, blobs_referenced referenced, void *user,
                                                 uint64_t *n_removed, struct groom_diag *diag);

@@ -19,7 +19,7 @@ groom_status blobs_collect(struct blobs *blobs, const char *sha256, blobs_refere
     /* The row is asked for with the lock held: whoever writes one holds a pin, which needs the lock. */
     pthread_mutex_lock(&blobs->lock);
     groom_status status = GROOM_OK;
-    if (!pin_held(blobs, sha256))
+    if (blobs->n_holds == 0 && !pin_held(blobs, sha256))
         status = referenced(user, sha256, &kept);
     if (status == GROOM_OK && !kept && unlinkat(blobs->fd, name, 0) != 0) {
         kept = true;
@@ -30,6 +30,20 @@ groom_status blobs_collect(struct blobs *blobs, const char *sha256, blobs_refere
     if (status == GROOM_OK && removed)
         *removed = !kept;
     return status;
+}
+
+void blobs_hold(struct blobs *blobs)
+{
+    pthread_mutex_lock(&blobs->lock);
+    blobs->n_holds++;
+    pthread_mutex_unlock(&blobs->lock);
+}
+
+void blobs_release(struct blobs *blobs)
+{
+    pthread_mutex_lock(&blobs->lock);
+    blobs->n_holds--;
+    pthread_mutex_unlock(&blobs->lock);
 }
 
 static groom_status visit_folder(struct blobs *blobs, const char *name,

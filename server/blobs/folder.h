@@ -18,6 +18,7 @@ struct blobs {
     const struct blobs_system *system;
     pthread_mutex_t lock;  /* pins, and the step from a temporary to a blob or from a blob to nothing */
     struct blobs_pin *pins;
+    uint32_t n_holds;       /* nothing is removed while there are any */
     uint64_t n_temporaries; /* names them */
 };
 

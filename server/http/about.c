@@ -57,7 +57,7 @@ static const char *disk_trouble(const struct service *service, char *text, size_
                  (unsigned long long)disk.f_bavail * disk.f_frsize);
     else {
         int fd = open(service->temporary_folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
-        if (fd >= 0 && write(fd, "ready?", 6) == 6) {
+        if (fd >= 0 && write(fd, "ready?", 6) == 6 && fdatasync(fd) == 0) {
             close(fd);
             return NULL;
         }

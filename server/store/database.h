@@ -44,6 +44,11 @@ struct store {
     struct connection writer, readers[DATABASE_READERS];
     pthread_mutex_t lock; /* of what follows */
     pthread_cond_t freed;
+    struct { /* what store_ping found last */
+        int64_t at_ms;
+        groom_status status;
+        struct groom_diag diag;
+    } ping;
     struct connection *free;
 };
 
@@ -106,6 +111,12 @@ GROOM_MUST_CHECK groom_status schema_migrate(sqlite3 *db, const char *const *ste
                                              struct groom_diag *diag);
 extern const char *const schema_steps[];
 extern const int schema_version;
+
+/* --- copies (copy.c) ------------------------------------------------------------------------- */
+
+/* A copy as a store with its writer alone, brought to the present schema. */
+GROOM_MUST_CHECK groom_status database_open_copy(const char *path, struct store *store, struct groom_diag *diag);
+void database_close_copy(struct store *store);
 
 /* --- parts of larger transactions ----------------------------------------------------------- */
 

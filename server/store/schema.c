@@ -81,7 +81,11 @@ static const char version_4[] =
     "ALTER TABLE jobs ADD COLUMN events_retired INTEGER NOT NULL DEFAULT 0;"
     "CREATE INDEX jobs_by_end ON jobs (finished) WHERE state >= 2;";
 
-const char *const schema_steps[] = {version_1, version_2, version_3, version_4};
+/* whether it can be written to, asked by /readyz */
+static const char version_5[] =
+    "CREATE TABLE heartbeat (one INTEGER PRIMARY KEY CHECK (one = 1), at INTEGER NOT NULL) STRICT;";
+
+const char *const schema_steps[] = {version_1, version_2, version_3, version_4, version_5};
 const int schema_version = sizeof schema_steps / sizeof schema_steps[0];
 
 static groom_status read_version(sqlite3 *db, int *version, struct groom_diag *diag)

@@ -119,13 +119,40 @@ void store_close(struct store *store)
     free(store);
 }
 
+/* A database that lies in the cache reads well on a dead disk: it is written to. */
+static groom_status beat(struct store *store, struct groom_diag *diag)
+{
+    struct connection *c;
+    groom_status status = transaction_begin(store, &c, diag);
+    if (status != GROOM_OK)
+        return status;
+    struct query q = query_open(c, "INSERT INTO heartbeat (one, at) VALUES (1, ?1)"
+                                   " ON CONFLICT (one) DO UPDATE SET at = ?1", diag);
+    query_integer(&q, 1, store_now_ms());
+    return transaction_end(c, query_run(&q, NULL), diag);
+}
+
+/* Whoever asks often is told what was found last: each beat waits for the disk. */
 groom_status store_ping(struct store *store, struct groom_diag *diag)
 {
-    struct connection *c = read_begin(store);
-    struct query q = query_open(c, "SELECT count(*) FROM sqlite_schema", diag);
-    query_row(&q);
-    groom_status status = query_end(&q);
-    read_end(c);
+    struct groom_diag found = {0};
+    int64_t now = store_now_ms();
+    pthread_mutex_lock(&store->lock);
+    bool fresh = store->ping.at_ms && now >= store->ping.at_ms && now - store->ping.at_ms < 1000;
+    groom_status status = store->ping.status;
+    if (fresh && diag)
+        *diag = store->ping.diag;
+    pthread_mutex_unlock(&store->lock);
+    if (fresh)
+        return status;
+    status = beat(store, &found);
+    pthread_mutex_lock(&store->lock);
+    store->ping.at_ms = now;
+    store->ping.status = status;
+    store->ping.diag = found;
+    pthread_mutex_unlock(&store->lock);
+    if (diag)
+        *diag = found;
     return status;
 }
 

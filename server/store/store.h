@@ -30,7 +30,7 @@ struct store;
 GROOM_MUST_CHECK groom_status store_open(const char *path, struct store **store, struct groom_diag *diag);
 void store_close(struct store *store); /* takes NULL */
 
-/* A read that proves the database answers: for /readyz. */
+/* Does the database read and write? For /readyz; what was found holds for a second. */
 GROOM_MUST_CHECK groom_status store_ping(struct store *store, struct groom_diag *diag);
 
 /* --- ids and times ------------------------------------------------------------------ */
@@ -459,6 +459,27 @@ struct store_counts {
 };
 GROOM_MUST_CHECK groom_status store_count(struct store *store, struct store_counts *counts,
                                           struct groom_diag *diag);
+
+/* --- copies: for backups and checks -------------------------------------------------------------- */
+
+/* All of the database as it is now into a new file, while others read and write. */
+GROOM_MUST_CHECK groom_status store_copy(struct store *store, const char *path, struct groom_diag *diag);
+/* The same of a database that nobody has open. */
+GROOM_MUST_CHECK groom_status store_copy_file(const char *from, const char *path, struct groom_diag *diag);
+void store_copy_remove(const char *path);
+
+/* What a check finds, and what the rows of a copy name outside the database. */
+struct store_check_sink {
+    void (*problem)(void *user, const char *text); /* NULL: only name what lies outside */
+    void (*blob)(void *user, const char *sha256, uint64_t n_bytes, const char *owner); /* in the order of hashes */
+    void (*upload)(void *user, const char *id, uint64_t n_durable);
+    void *user;
+};
+/* Of a copy, which is brought to the present schema first. What is wrong goes to the sink; a status is
+ * returned only where the check could not be made. */
+GROOM_MUST_CHECK groom_status store_copy_check(const char *path, const struct store_check_sink *sink,
+                                               struct groom_diag *diag);
+GROOM_MUST_CHECK groom_status store_copy_drop_upload(const char *path, const char *id, struct groom_diag *diag);
 
 /* What goes: rows of jobs that ended before these times; 0: nothing of the kind. */
 struct store_retention {
