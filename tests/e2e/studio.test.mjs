@@ -20,7 +20,7 @@ function sample(t) {
 const shown = (page) => page.evaluate(() => Array.from(window.studio.evaluation.strands.points.slice(3, -6)));
 
 /** Waits until the page has settled on a revision. */
-const settled = (page, revision) => page.waitForFunction((r) => window.studio?.session.revision === r && !window.studio.evaluation.running, revision);
+const settled = (page, revision) => page.waitForFunction((r) => window.studio?.session.revision === r && !window.studio.session.busy && !window.studio.evaluation.running, revision);
 
 /** How many pixels of the canvas differ from its background by more than a little. */
 const drawn = (page) => page.evaluate(() => {
@@ -67,6 +67,27 @@ test('from files to a groom, a knob, back, and home', { skip, timeout: 300000 },
     await settled(page, 4);
     assert.deepEqual(await shown(page), turned);
   });
+  await t.test('a guide follows the hand, keeps its length, and takes its strands along', async () => {
+    const held = await shown(page);
+    await page.getByLabel(/^guides/).check();
+    const lengths = await page.evaluate(async () => {
+      const { editor } = window.studio, length = (p) => {
+        let sum = 0;
+        for (let i = 3; i < p.length; i += 3) sum += Math.hypot(p[i] - p[i - 3], p[i + 1] - p[i - 2], p[i + 2] - p[i - 1]);
+        return sum;
+      };
+      editor.chosen = 5;
+      const before = length(editor.guide), tip = editor.vertices - 1, at = editor.guide.slice(3 * tip);
+      const Vector3 = editor.viewer.camera.position.constructor;
+      editor.drag(5, tip, new Vector3(at[0] + 0.05, at[1] + 0.03, at[2]));
+      await editor.settle();
+      return [before, length(editor.guide)];
+    });
+    await settled(page, 5);
+    assert.ok(Math.abs(lengths[1] / lengths[0] - 1) < 1e-4, `${lengths}`);
+    assert.notDeepEqual(await shown(page), held);
+    await page.getByLabel(/^guides/).uncheck();
+  });
   await t.test('what is downloaded is what is shown', async () => {
     await page.locator('select[name=format]').selectOption('data');
     await page.locator('select[name=unit]').selectOption('m');
@@ -86,6 +107,20 @@ test('from files to a groom, a knob, back, and home', { skip, timeout: 300000 },
     await page.waitForTimeout(500);
     await picture(page, 'studio-side-by-side');
   });
+});
+
+test('pages pass an accessibility check and fit a narrow window', { skip, timeout: 120000 }, async (t) => {
+  const daemon = await startDaemon(t), folder = sample(t), page = await startBrowser(t, daemon);
+  const imported = await daemon.fetch('/v1/grooms', { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: readFileSync(join(folder, 'truth.groom.json')) });
+  const axe = readFileSync(new URL('../node_modules/axe-core/axe.min.js', import.meta.url), 'utf8');
+  for (const [at, ready] of [['/', '.grooms'], [`/#/grooms/${(await imported.json()).groom}`, '.chain .lil-gui']]) {
+    await page.goto(daemon.url + at);
+    await page.locator(ready).first().waitFor();
+    const violations = await page.evaluate(`${axe};axe.run(document).then((r) => r.violations.map((v) => v.id + ': ' + v.nodes.map((n) => n.html).join(' ')))`);
+    assert.deepEqual(violations, [], at);
+  }
+  await page.setViewportSize({ width: 420, height: 700 });
+  assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), 'nothing sticks out to the right');
 });
 
 test('a file that is none is refused in words', { skip, timeout: 120000 }, async (t) => {

@@ -163,6 +163,12 @@ export class Groom {
         this.engine.exports.engine_identify(this.address, index, operator.id, high(seed), low(seed), operator.enabled === false ? 0 : 1);
     }
 
+    /* Vertices of a guide: Float32Array [vertices * 3]. */
+    moveGuide(guide, points) {
+        const guides = this.engine.exports.engine_array(this.address, 2);
+        new Float32Array(this.engine.memory, guides + 12 * guide * this.vertices, points.length).set(points);
+    }
+
     remove(index) { this.engine.check(this.engine.exports.engine_remove(this.address, index)); }
     move(from, to) { this.engine.check(this.engine.exports.engine_move(this.address, from, to)); }
 

@@ -1,6 +1,7 @@
 /* One groom: the picture on the left, the work on the right. */
 import { EngineThread } from './engine_thread.mjs';
 import { action, by_id, element, notice, say, whole } from './dom.mjs';
+import { GuideEditor } from './guide_editor.mjs';
 import { Session } from './session.mjs';
 import { arrayOf, fetchHead, fetchStrands } from './strands.mjs';
 import { exportPanel } from './panels/export.mjs';
@@ -62,7 +63,7 @@ function showGuides(viewer, document, on) {
     viewer.setGuides({ ...document.guides, points: arrayOf(document.guides.points) }, operator_guides);
 }
 
-function viewPanel(parent, session, viewer) {
+function viewPanel(parent, session, viewer, editor) {
     const looks = Object.keys(VIEWS).map((name, i) => element('button', { type: 'button', onclick: () => viewer.look(name), title: `Key ${i + 1}` }, name));
     const compare = element('select', { onchange: () => { viewer.comparison = compare.value; wipe.hidden = compare.value !== 'wipe'; viewer.draw(); } },
         COMPARISONS.map((name) => element('option', {}, name)));
@@ -70,12 +71,15 @@ function viewPanel(parent, session, viewer) {
         oninput: () => { viewer.wipe = Number(wipe.value); viewer.draw(); } });
     const density = element('input', { type: 'range', min: 100, max: session.document.strands.count, value: session.count,
         onchange: () => session.choose(Number(density.value)).catch(notice) });
-    const guides = element('input', { type: 'checkbox', onchange: () => showGuides(viewer, session.document, guides.checked) });
+    const guides = element('input', { type: 'checkbox', onchange: () => {
+        showGuides(viewer, session.document, guides.checked);
+        editor.enable(guides.checked);
+    } });
     const comparing = element('label', { hidden: true }, 'compare', compare);
     session.addEventListener('document', () => guides.checked && showGuides(viewer, session.document, true));
     parent.append(element('section', { class: 'panel' }, element('h2', {}, 'View'),
         element('div', { class: 'row' }, looks), comparing, wipe, element('label', {}, 'density', density),
-        element('label', {}, guides, 'guides; operator guides in orange')));
+        element('label', {}, guides, 'guides: click one, drag its points; operator guides in orange')));
     return comparing;
 }
 
@@ -88,7 +92,7 @@ export async function groomPage(main, id, strands = AT_FIRST) {
     main.replaceChildren(element('div', { class: 'studio' }, picture, work));
     by_id('trail').replaceChildren(element('a', { href: `#/grooms/${id}` }, session.document.name || id));
     const viewer = new Viewer(picture), evaluation = new Evaluation(session, viewer);
-    const comparing = viewPanel(work, session, viewer), chain = element('div', { class: 'chain' });
+    const editor = new GuideEditor(viewer, session), comparing = viewPanel(work, session, viewer, editor), chain = element('div', { class: 'chain' });
     work.append(chain);
     operatorsPanel(chain, session, types);
     historyPanel(work, session);
@@ -102,6 +106,6 @@ export async function groomPage(main, id, strands = AT_FIRST) {
     const { head } = session.document.source ?? {};
     if (head) fetchHead(head).then((geometry) => viewer.setHead(geometry)).catch(notice);
     showTarget(viewer, session).then((shown) => { comparing.hidden = !shown; }).catch(notice);
-    window.studio = { viewer, session, evaluation }; /* for those who look inside, tests among them */
+    window.studio = { viewer, session, evaluation, editor }; /* for those who look inside, tests among them */
     return () => { viewer.dispose(); thread.close(); };
 }

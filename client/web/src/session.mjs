@@ -6,7 +6,7 @@ import { call, get } from './api.mjs';
 export class Session extends EventTarget {
     constructor(id, thread) {
         super();
-        Object.assign(this, { id, thread, undone: [], sending: Promise.resolve() });
+        Object.assign(this, { id, thread, undone: [], sending: Promise.resolve(), busy: 0 }); /* busy: changes under way */
     }
 
     get at() { return `/v1/grooms/${this.id}`; }
@@ -39,21 +39,38 @@ export class Session extends EventTarget {
         return this.patch([{ op: 'replace', path: `/operators/${index}/${parameter}`, value: this.operators[index][parameter] }], { reload: false });
     }
 
+    /* A guide under the hand, and at rest: all guides go to the server as a file. */
+    async moveGuide(guide, points) {
+        await this.thread.call('moveGuide', { guide, points });
+        this.#tell('strands');
+    }
+
+    putGuides(file) {
+        return this.#queue(() => call('PUT', `${this.at}/guides?format=data`,
+            { body: new Blob([file]), type: 'application/octet-stream', headers: { 'If-Match': this.etag } }), true);
+    }
+
     patch(operations, { reload = true } = {}) {
-        this.sending = this.sending.catch(() => {}).then(() => this.#send(operations, reload));
+        return this.#queue(() => call('PATCH', this.at,
+            { body: operations, type: 'application/json-patch+json', headers: { 'If-Match': this.etag } }), reload);
+    }
+
+    #queue(send, reload) {
+        this.sending = this.sending.catch(() => {}).then(() => this.#commit(send, reload));
         return this.sending;
     }
 
-    async #send(operations, reload) {
+    async #commit(send, reload) {
+        this.busy++;
         try {
-            const { json, etag } = await call('PATCH', this.at,
-                { body: operations, type: 'application/json-patch+json', headers: { 'If-Match': this.etag } });
+            const { json, etag } = await send();
             Object.assign(this, { etag, revision: json.revision, shown: json.revision, undone: [] });
             if (reload) await this.reload();
         } catch (error) {
             await this.reload(); /* what the server holds is what is shown */
             throw error;
         } finally {
+            this.busy--;
             this.#tell('revision');
         }
     }
@@ -76,11 +93,8 @@ export class Session extends EventTarget {
 
     async revisions() { return (await get(`${this.at}/revisions`)).revisions; }
 
-    async revert(revision) {
-        const { json, etag } = await call('POST', `${this.at}/revert`, { body: { revision }, headers: { 'If-Match': this.etag } });
-        Object.assign(this, { etag, revision: json.revision });
-        await this.reload();
-        this.#tell('revision');
+    revert(revision) {
+        return this.#queue(() => call('POST', `${this.at}/revert`, { body: { revision }, headers: { 'If-Match': this.etag } }), true);
     }
 
     /* The revision whose content is shown stands in `shown`; a revert's own number does not count. */

@@ -28,6 +28,7 @@ const calls = {
         const known = (await engine).typeOf(type);
         both((groom) => groom.set(index, known, parameter, value));
     },
+    moveGuide: ({ guide, points }) => both((groom) => groom.moveGuide(guide, points)),
     enable: ({ index, operator }) => both((groom) => groom.enable(index, operator)),
     evaluate() {
         const from = performance.now(), points = shown.evaluate();
