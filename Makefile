@@ -228,6 +228,9 @@ install: programs
 	install -m 644 $(LIBGROOM) $(DESTDIR)$(PREFIX)/lib
 	install -m 755 $(BUILD)/libgroom.so $(DESTDIR)$(PREFIX)/lib
 	install -m 644 lib/include/groom/*.h $(DESTDIR)$(PREFIX)/include/groom
+	install -d $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/bash-completion/completions
+	$(BUILD)/groomctl manual >$(DESTDIR)$(PREFIX)/share/man/man1/groomctl.1
+	$(BUILD)/groomctl completion bash >$(DESTDIR)$(PREFIX)/share/bash-completion/completions/groomctl
 	install -m 644 proto/openapi.yaml $(DESTDIR)$(PREFIX)/share/groomd
 
 clean:

@@ -126,6 +126,8 @@ const struct command groomctl_commands[] = {
     {"sample", "", 0, 0, sample_options, "make a reconstruction with known truth, without a server", command_sample},
     {"options", "", 0, 0, NULL, "every option of a fit, with its default", command_options},
     {"health", "", 0, 0, NULL, "whether the server is alive and ready", command_health},
+    {"completion", "bash|zsh", 1, 1, NULL, "completion for a shell: source <(groomctl completion bash)", command_completion},
+    {"manual", "", 0, 0, NULL, "the man page: groomctl manual | man -l -", command_manual},
     {0},
 };
 

@@ -57,6 +57,8 @@ int command_revisions(struct groomctl *ctl, const struct arguments *arguments);
 int command_revert(struct groomctl *ctl, const struct arguments *arguments);
 int command_sample(struct groomctl *ctl, const struct arguments *arguments);
 int command_options(struct groomctl *ctl, const struct arguments *arguments);
+int command_completion(struct groomctl *ctl, const struct arguments *arguments);
+int command_manual(struct groomctl *ctl, const struct arguments *arguments);
 int command_health(struct groomctl *ctl, const struct arguments *arguments);
 
 #endif
