@@ -136,9 +136,9 @@ static groom_status list_strands(const struct groom *groom, uint32_t index, stru
     return input->strand ? GROOM_OK : GROOM_ENOMEM;
 }
 
-groom_status groom_layer_input_create(const struct groom *groom, uint32_t index, const struct groom_strands *before,
-                                      const struct groom_context *context, struct groom_layer_input **out,
-                                      struct groom_diag *diag)
+/* All but the conversion. */
+static groom_status begin(const struct groom *groom, uint32_t index, const struct groom_strands *before,
+                          const struct groom_context *context, struct groom_layer_input **out, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     const struct groom_layer *layer = groom->operators[index].layer;
@@ -153,11 +153,35 @@ groom_status groom_layer_input_create(const struct groom *groom, uint32_t index,
     if (status == GROOM_OK && list_strands(groom, index, input) != GROOM_OK)
         status = groom_fail(diag, GROOM_ENOMEM, "no memory for a layer over %u strands", groom->n_strands);
     if (status == GROOM_OK)
-        status = convert(input, before, context, diag);
-    if (status == GROOM_OK)
         *out = input;
     else
         groom_layer_input_destroy(input);
+    return status;
+}
+
+groom_status groom_layer_count(const struct groom *groom, uint32_t index, const struct groom_strands *before,
+                               const struct groom_context *context, uint32_t *n, struct groom_diag *diag)
+{
+    struct groom_layer_input *input = NULL;
+    groom_status status = begin(groom, index, before, context, &input, diag);
+    if (status == GROOM_OK)
+        *n = input->n;
+    groom_layer_input_destroy(input);
+    return status;
+}
+
+groom_status groom_layer_input_create(const struct groom *groom, uint32_t index, const struct groom_strands *before,
+                                      const struct groom_context *context, struct groom_layer_input **out,
+                                      struct groom_diag *diag)
+{
+    struct groom_layer_input *input = NULL;
+    groom_status status = begin(groom, index, before, context, &input, diag);
+    if (status == GROOM_OK && (status = convert(input, before, context, diag)) != GROOM_OK) {
+        groom_layer_input_destroy(input);
+        return status;
+    }
+    if (status == GROOM_OK)
+        *out = input;
     return status;
 }
 

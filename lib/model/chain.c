@@ -136,6 +136,28 @@ groom_status groom_remove_operator(struct groom *groom, uint32_t index, struct g
     return GROOM_OK;
 }
 
+groom_status groom_borrow(const struct groom *groom, uint32_t without, struct groom *copy, struct groom_diag *diag)
+{
+    uint32_t n = groom->n_operators - (without < groom->n_operators);
+    struct groom_operator *operators = memory_array(groom->allocator, n, sizeof *operators);
+    if (!operators)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for a chain of %u operators", n);
+    for (uint32_t i = 0; i < n; i++)
+        operators[i] = groom->operators[i < without ? i : i + 1];
+    *copy = *groom;
+    copy->operators = operators;
+    copy->n_operators = n;
+    return GROOM_OK;
+}
+
+void groom_borrow_end(struct groom *copy, uint32_t added)
+{
+    if (added < copy->n_operators)
+        model_operator_finish(copy, &copy->operators[added]);
+    memory_release(copy->allocator, copy->operators, copy->n_operators, sizeof *copy->operators);
+    *copy = (struct groom){0};
+}
+
 groom_status groom_move_operator(struct groom *groom, uint32_t from, uint32_t to, struct groom_diag *diag)
 {
     groom_status status = check_index(groom, from, diag);

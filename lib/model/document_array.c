@@ -175,6 +175,18 @@ out:
     return status;
 }
 
+groom_status groom_document_array_write(const void *elements, int is_float, const uint32_t *shape,
+                                        uint32_t n_dimensions, char **json, size_t *n_bytes)
+{
+    cJSON *node = NULL;
+    groom_status status =
+        document_array_create(elements, is_float ? DOCUMENT_F32 : DOCUMENT_U32, shape, n_dimensions, NULL, &node);
+    if (status == GROOM_OK)
+        status = document_print(node, json, n_bytes, NULL);
+    cJSON_Delete(node);
+    return status;
+}
+
 groom_status document_array_inline(cJSON *node, const struct groom_array_finder *finder, struct groom_diag *diag)
 {
     const char *reference = string_member(node, "$array");

@@ -165,10 +165,16 @@ static groom_status read_vector(const struct reader *r, const char *path, const 
     const cJSON *child;
     uint32_t i = 0;
     int good = cJSON_IsArray(node) && cJSON_GetArraySize(node) == (int)n;
-    cJSON_ArrayForEach(child, node) good = good && cJSON_IsNumber(child);
+    cJSON_ArrayForEach(child, node)
+    {
+        good = good && cJSON_IsNumber(child);
+    }
     if (!good)
         return refuse(r, path, "%u finite numbers in a list are needed here", n);
-    cJSON_ArrayForEach(child, node) out[i++] = (float)child->valuedouble;
+    cJSON_ArrayForEach(child, node)
+    {
+        out[i++] = (float)child->valuedouble;
+    }
     return GROOM_OK;
 }
 

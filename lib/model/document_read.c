@@ -416,6 +416,34 @@ out:
     return status;
 }
 
+groom_status groom_document_operator_read(const char *json, size_t n_bytes, const struct groom_array_finder *finder,
+                                          struct groom *groom, uint32_t index, struct groom_diag *diag)
+{
+    cJSON *root;
+    uint32_t n = groom->n_operators, highest = 0;
+    groom_status status = document_parse(json, n_bytes, &root, diag);
+    if (status != GROOM_OK)
+        return status;
+    for (uint32_t i = 0; i < n; i++)
+        highest = groom->operators[i].id > highest ? groom->operators[i].id : highest;
+    struct reader reader = {.root = root, .finder = finder, .diag = diag, .next_free_id = highest + 1};
+    struct place place = {&reader, index};
+    if (n >= MAX_OPERATORS)
+        status = refuse(place, "type", "the chain has as many operators as it may");
+    if (status == GROOM_OK)
+        status = read_operator(place, root, groom);
+    if (status == GROOM_OK)
+        status = check_ids(&reader, groom);
+    if (status == GROOM_OK)
+        status = model_validate_operator(groom, index, diag);
+    cJSON_Delete(root);
+    if (status != GROOM_OK && groom->n_operators > n) {
+        groom_status removed = groom_remove_operator(groom, index, NULL);
+        (void)removed;
+    }
+    return status;
+}
+
 groom_status groom_document_read(const char *json, size_t n_bytes, const struct groom_array_finder *finder,
                                  const struct groom_context *context, struct groom **groom,
                                  struct groom_diag *diag)

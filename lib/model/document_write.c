@@ -142,6 +142,23 @@ static void write_operators(struct writer *writer, const struct groom *groom)
         write_operator(writer, groom, &groom->operators[i], chain);
 }
 
+groom_status groom_document_operator_write(const struct groom *groom, uint32_t index,
+                                           const struct groom_array_keeper *keeper, char **json, size_t *n_bytes,
+                                           struct groom_diag *diag)
+{
+    struct writer writer = {.root = cJSON_CreateArray(), .keeper = keeper};
+    need(&writer, writer.root);
+    if (writer.status == GROOM_OK)
+        write_operator(&writer, groom, &groom->operators[index], writer.root);
+    groom_status status = writer.status;
+    if (status == GROOM_OK)
+        status = document_print(cJSON_GetArrayItem(writer.root, 0), json, n_bytes, diag);
+    else
+        groom_fail(diag, status, "the operator could not be written: %s", groom_status_message(status));
+    cJSON_Delete(writer.root);
+    return status;
+}
+
 static int is_model_member(const char *name)
 {
     static const char *const members[] = {"format",     "unit",            "name",     "strands", "guides",

@@ -41,6 +41,9 @@ GROOM_MUST_CHECK groom_status layer_copy(const struct groom_layer *from, uint32_
 /* The operator at `index` of the groom: all that can be told without its strands. */
 GROOM_MUST_CHECK groom_status layer_validate(const struct groom *groom, uint32_t index, struct groom_diag *diag);
 
+/* One operator, whatever it is. */
+GROOM_MUST_CHECK groom_status model_validate_operator(const struct groom *groom, uint32_t index, struct groom_diag *diag);
+
 /* The first enabled layer, or n_operators. */
 uint32_t model_first_layer(const struct groom *groom);
 

@@ -85,23 +85,28 @@ static groom_status check_randoms(const struct groom *groom, uint32_t index, str
     return GROOM_OK;
 }
 
+groom_status model_validate_operator(const struct groom *groom, uint32_t index, struct groom_diag *diag)
+{
+    char pointer[sizeof diag->pointer];
+    const struct groom_operator *op = &groom->operators[index];
+    snprintf(pointer, sizeof pointer, "/operators/%u/type", index);
+    if ((unsigned)op->type >= GROOM_OPERATOR_TYPES)
+        return groom_fail_field(diag, GROOM_EINVAL, pointer, "there is no operator type %d", (int)op->type);
+    if (groom->n_operator_guides == 0 && groom_operator_needs_guides(op->type))
+        return groom_fail_field(diag, GROOM_EINVAL, pointer, MODEL_NEEDS_GUIDES, groom_operator_name(op->type));
+    groom_status status = check_parameters(op, index, diag);
+    if (status == GROOM_OK)
+        status = check_randoms(groom, index, diag);
+    if (status == GROOM_OK && op->layer)
+        status = layer_validate(groom, index, diag);
+    return status;
+}
+
 static groom_status check_operators(const struct groom *groom, struct groom_diag *diag)
 {
     groom_status status = GROOM_OK;
-    char pointer[sizeof diag->pointer];
-    for (uint32_t i = 0; i < groom->n_operators && status == GROOM_OK; i++) {
-        const struct groom_operator *op = &groom->operators[i];
-        snprintf(pointer, sizeof pointer, "/operators/%u/type", i);
-        if ((unsigned)op->type >= GROOM_OPERATOR_TYPES)
-            return groom_fail_field(diag, GROOM_EINVAL, pointer, "there is no operator type %d", (int)op->type);
-        if (groom->n_operator_guides == 0 && groom_operator_needs_guides(op->type))
-            return groom_fail_field(diag, GROOM_EINVAL, pointer, MODEL_NEEDS_GUIDES, groom_operator_name(op->type));
-        status = check_parameters(op, i, diag);
-        if (status == GROOM_OK)
-            status = check_randoms(groom, i, diag);
-        if (status == GROOM_OK && op->layer)
-            status = layer_validate(groom, i, diag);
-    }
+    for (uint32_t i = 0; i < groom->n_operators && status == GROOM_OK; i++)
+        status = model_validate_operator(groom, i, diag);
     return status;
 }
 

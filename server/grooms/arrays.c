@@ -62,6 +62,19 @@ groom_status arrays_allow(struct arrays *arrays, const cJSON *document)
     return GROOM_OK;
 }
 
+void arrays_use(struct arrays *arrays, const cJSON *document)
+{
+    const cJSON *child;
+    struct arrays_item *item;
+    if (cJSON_IsString(document) && document->string && strcmp(document->string, "$array") == 0 &&
+        (item = find_item(arrays, document->valuestring)) != NULL)
+        item->used = true;
+    cJSON_ArrayForEach(child, document)
+    {
+        arrays_use(arrays, child);
+    }
+}
+
 static groom_status find(void *user, const char *reference, const void **bytes, size_t *n_bytes)
 {
     struct arrays *arrays = user;

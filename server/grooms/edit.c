@@ -5,25 +5,14 @@
 #include "proto/json_patch.h"
 #include "server/grooms/room.h"
 
-/* One edit under way. */
-struct edit {
-    struct grooms *grooms;
-    const char *groom_id;
-    uint32_t expected;
-    const char *note;
-    struct store_revision revision; /* the one that is changed */
-    cJSON *document;                /* its tree */
-    struct arrays arrays;
-    struct groom_diag *diag;
-};
-
-/* Also refuses an edit that has come too late before any work is done; the store has the last word. */
-static groom_status edit_begin(struct edit *edit)
+groom_status edit_begin(struct edit *edit)
 {
     groom_status status = documents_load(edit->grooms, edit->groom_id, 0, &edit->revision, &edit->document, edit->diag);
     arrays_init(&edit->arrays, edit->grooms->options.store);
     if (status != GROOM_OK)
         return status;
+    if (edit->expected == 0)
+        edit->expected = edit->revision.number;
     if (edit->revision.number != edit->expected)
         return groom_fail(edit->diag, GROOM_ECONFLICT,
                           "the groom is at revision %u by now, not %u: get it again and repeat the edit",
@@ -31,7 +20,7 @@ static groom_status edit_begin(struct edit *edit)
     return arrays_allow(&edit->arrays, edit->document);
 }
 
-static void edit_finish(struct edit *edit)
+void edit_finish(struct edit *edit)
 {
     cJSON_Delete(edit->document);
     arrays_finish(&edit->arrays);
@@ -91,6 +80,24 @@ static groom_status edit_commit(struct edit *edit, const struct groom *groom, cJ
     if (status == GROOM_OK)
         *number = edit->expected + 1;
     free(around);
+    return status;
+}
+
+groom_status edit_prepare_tree(struct edit *edit, char **text, struct store_array **list,
+                               struct store_revision_new *next)
+{
+    const cJSON *name = cJSON_GetObjectItemCaseSensitive(edit->document, "name");
+    *next = (struct store_revision_new){.groom_id = edit->groom_id, .note = edit->note, .name = edit->revision.name};
+    if (cJSON_IsString(name))
+        next->name = name->valuestring;
+    if (documents_set_number(edit->document, "revision", edit->expected + 1) != GROOM_OK ||
+        documents_set_number(edit->document, "parent", edit->expected) != GROOM_OK ||
+        !(*text = cJSON_PrintUnformatted(edit->document)))
+        return groom_fail(edit->diag, GROOM_ENOMEM, "no memory for the groom document");
+    arrays_use(&edit->arrays, edit->document);
+    next->document = *text;
+    groom_status status = arrays_list(&edit->arrays, list, &next->n_arrays);
+    next->arrays = *list;
     return status;
 }
 
@@ -214,6 +221,8 @@ out:
 static groom_status replace_guides(struct groom *groom, const struct groom_strands *guides,
                                    const struct groom_context *context, struct groom_diag *diag)
 {
+    if (groom->n_guides == 0)
+        return groom_fail(diag, GROOM_EINVAL, "this groom is made of uploaded strands: it has no guides to replace");
     if (guides->n_strands != groom->n_guides)
         return groom_fail(diag, GROOM_EINVAL,
                           "%u strands were sent and the groom has %u guides: send as many, in the same order",

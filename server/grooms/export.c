@@ -31,19 +31,32 @@ groom_status select_fairly(const struct groom *groom, uint32_t count, struct gro
 static groom_status write_pieces(struct grooms *grooms, const struct groom *groom, struct groom_writer *writer,
                                  struct groom_diag *diag)
 {
-    size_t m = groom->n_vertices;
-    float(*points)[3] = malloc(PIECE_STRANDS * m * sizeof *points);
+    float(*points)[3] = malloc(PIECE_STRANDS * (size_t)groom->n_vertices * sizeof *points);
     groom_status status = GROOM_OK;
     if (!points)
         return groom_fail(diag, GROOM_ENOMEM, "no memory to evaluate strands");
     for (uint32_t first = 0; first < groom->n_strands && status == GROOM_OK; first += PIECE_STRANDS) {
         uint32_t left = groom->n_strands - first, count = left < PIECE_STRANDS ? left : PIECE_STRANDS;
+        size_t n_points = groom_first_vertex(groom, first + count) - groom_first_vertex(groom, first);
         status = groom_evaluate(groom, first, count, points, &grooms->context, diag);
         if (status == GROOM_OK)
-            status = groom_writer_points(writer, (const float(*)[3])points, count * m, diag);
+            status = groom_writer_points(writer, (const float(*)[3])points, n_points, diag);
     }
     free(points);
     return status;
+}
+
+/* How many vertices each strand has, or NULL where that is no question. */
+static groom_status count_vertices(const struct groom *groom, uint32_t **counts)
+{
+    *counts = NULL;
+    if (!groom->base)
+        return GROOM_OK;
+    if (!(*counts = malloc(groom->n_strands * sizeof **counts)))
+        return GROOM_ENOMEM;
+    for (uint32_t i = 0; i < groom->n_strands; i++)
+        (*counts)[i] = groom->first[i + 1] - groom->first[i];
+    return GROOM_OK;
 }
 
 static groom_status write_groom(struct grooms *grooms, const struct groom *groom,
@@ -51,13 +64,17 @@ static groom_status write_groom(struct grooms *grooms, const struct groom *groom
                                 struct groom_diag *diag)
 {
     struct groom_writer *writer = NULL;
-    groom_status status = groom_writer_create(options, groom->n_strands, NULL, groom->n_vertices, sink,
+    uint32_t *counts;
+    if (count_vertices(groom, &counts) != GROOM_OK)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to write %u strands", groom->n_strands);
+    groom_status status = groom_writer_create(options, groom->n_strands, counts, groom->n_vertices, sink,
                                               &grooms->context, &writer, diag);
     if (status == GROOM_OK)
         status = write_pieces(grooms, groom, writer, diag);
     if (status == GROOM_OK)
         status = groom_writer_finish(writer, diag);
     groom_writer_destroy(writer);
+    free(counts);
     return status;
 }
 
@@ -65,18 +82,22 @@ groom_status grooms_write_strands(struct grooms *grooms, const char *groom_id, c
                                   struct groom_sink sink, struct groom_diag *diag)
 {
     struct model *model = NULL;
-    struct groom *fewer = NULL;
+    struct groom *fewer = NULL, rest;
+    struct state *state = NULL;
     groom_status status = models_acquire(grooms, groom_id, what->revision, &model, diag);
     if (status != GROOM_OK)
         return status;
     if (what->count > model->groom->n_strands)
         status = groom_fail_field(diag, GROOM_EINVAL, "/count", "the groom has %u strands: ask for at most as many",
                                   model->groom->n_strands);
-    else if (what->count && what->count < model->groom->n_strands)
-        status = select_fairly(model->groom, what->count, &fewer, NULL, diag);
     if (status == GROOM_OK)
-        status = write_groom(grooms, fewer ? fewer : model->groom, &what->write, sink, diag);
+        status = evaluate_rest(grooms, model, &rest, &state, diag);
+    if (status == GROOM_OK && what->count && what->count < rest.n_strands)
+        status = select_fairly(&rest, what->count, &fewer, NULL, diag);
+    if (status == GROOM_OK)
+        status = write_groom(grooms, fewer ? fewer : &rest, &what->write, sink, diag);
     groom_destroy(fewer);
+    states_release(grooms->states, state);
     models_release(grooms, model);
     return status;
 }
@@ -90,6 +111,10 @@ groom_status grooms_write_guides(struct grooms *grooms, const char *groom_id, co
     if (status != GROOM_OK)
         return status;
     const struct groom *groom = model->groom;
+    if (groom->n_guides == 0) {
+        models_release(grooms, model);
+        return groom_fail(diag, GROOM_ENOTFOUND, "this groom is made of uploaded strands: it has no guides");
+    }
     status = groom_writer_create(&what->write, groom->n_guides, NULL, groom->n_vertices, sink, &grooms->context,
                                  &writer, diag);
     if (status == GROOM_OK)

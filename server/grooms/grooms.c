@@ -13,9 +13,10 @@ groom_status grooms_create(const struct grooms_options *options, struct grooms *
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the groom service");
     grooms->options = *options;
     grooms->context.pool = options->pool;
-    if (models_create(options->max_cache_bytes ? options->max_cache_bytes : DEFAULT_CACHE_BYTES, &grooms->models) !=
-        GROOM_OK) {
-        free(grooms);
+    size_t max_bytes = options->max_cache_bytes ? options->max_cache_bytes : DEFAULT_CACHE_BYTES;
+    if (models_create(max_bytes, &grooms->models) != GROOM_OK || states_create(2 * max_bytes, &grooms->states) != GROOM_OK ||
+        heads_create(&grooms->heads) != GROOM_OK) {
+        grooms_destroy(grooms);
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the groom service");
     }
     *out = grooms;
@@ -27,6 +28,8 @@ void grooms_destroy(struct grooms *grooms)
     if (!grooms)
         return;
     models_destroy(grooms->models);
+    states_destroy(grooms->states);
+    heads_destroy(grooms->heads);
     free(grooms);
 }
 
@@ -84,12 +87,10 @@ static groom_status write_kept(const struct groom *groom, const char *around, st
     return status;
 }
 
-groom_status grooms_prepare(struct grooms *grooms, const char *document, size_t n_bytes,
-                            const struct grooms_source *source, struct grooms_prepared *out,
-                            struct groom_diag *diag)
+groom_status prepare_groom(struct grooms *grooms, const struct groom *groom, const char *document, size_t n_bytes,
+                           const struct grooms_source *source, struct grooms_prepared *out, struct groom_diag *diag)
 {
     struct grooms_prepared prepared = {0};
-    struct groom *groom = NULL;
     char *around = NULL;
     groom_status status;
     prepared.kept = calloc(1, sizeof *prepared.kept);
@@ -97,8 +98,7 @@ groom_status grooms_prepare(struct grooms *grooms, const char *document, size_t 
         return groom_fail(diag, GROOM_ENOMEM, "no memory for a groom");
     arrays_init(&prepared.kept->arrays, grooms->options.store);
 
-    if ((status = groom_document_read(document, n_bytes, NULL, &grooms->context, &groom, diag)) != GROOM_OK ||
-        (status = store_make_id("grm_", prepared.groom_id)) != GROOM_OK ||
+    if ((status = store_make_id("grm_", prepared.groom_id)) != GROOM_OK ||
         (status = make_around(document, n_bytes, prepared.groom_id, source, &around, diag)) != GROOM_OK ||
         (status = write_kept(groom, around, prepared.kept, diag)) != GROOM_OK ||
         (status = arrays_list(&prepared.kept->arrays, &prepared.kept->list, &prepared.revision.n_arrays)) != GROOM_OK)
@@ -112,8 +112,19 @@ groom_status grooms_prepare(struct grooms *grooms, const char *document, size_t 
     prepared.kept = NULL;
 out:
     grooms_prepared_finish(&prepared);
-    groom_destroy(groom);
     free(around);
+    return status;
+}
+
+groom_status grooms_prepare(struct grooms *grooms, const char *document, size_t n_bytes,
+                            const struct grooms_source *source, struct grooms_prepared *prepared,
+                            struct groom_diag *diag)
+{
+    struct groom *groom = NULL;
+    groom_status status = groom_document_read(document, n_bytes, NULL, &grooms->context, &groom, diag);
+    if (status == GROOM_OK)
+        status = prepare_groom(grooms, groom, document, n_bytes, source, prepared, diag);
+    groom_destroy(groom);
     return status;
 }
 

@@ -12,6 +12,7 @@
 #define GROOMS_GROOMS_H
 
 #include "groom/format.h"
+#include "groom/groom.h"
 #include "groom/render.h"
 #include "server/blobs/blobs.h"
 #include "server/store/store.h"
@@ -95,6 +96,41 @@ GROOM_MUST_CHECK groom_status grooms_set_guides(struct grooms *grooms, const cha
 /* A new revision that is the same as an earlier one. */
 GROOM_MUST_CHECK groom_status grooms_revert(struct grooms *grooms, const char *groom_id, uint32_t expected,
                                             uint32_t revision, uint32_t *number, struct groom_diag *diag);
+
+/* --- layers: edits in curvature space (layer_edit.c) ------------------------------------------- */
+
+/* So many strands are edited while the client waits; more are a job's work. */
+#define GROOMS_EDIT_MOST_NOW 5000
+
+struct grooms_layer_edit {
+    const char *groom_id;     /* what is edited; NULL: */
+    const char *strands_id;   /* an upload, of which a new groom is made */
+    uint32_t expected;        /* its revision; 0: the latest, whatever it is */
+    groom_operator_type type; /* a layer */
+    const char *body;         /* JSON object: the layer's members as in a document, and layer, commit, points,
+                                 avoid_head, head, groom, revision, strands (openapi.yaml says what they do) */
+    size_t n_body;
+};
+
+enum grooms_edited_end {
+    GROOMS_EDITED,  /* a revision was made */
+    GROOMS_TRIED,   /* nothing was written */
+    GROOMS_TOO_MANY /* strands for now: nothing was done. Submit a job of this kind, inputs and options */
+};
+
+struct grooms_layer_edited {
+    enum grooms_edited_end end;
+    char groom_id[STORE_ID_SIZE];
+    uint32_t revision;
+    char *json;             /* the answer; or of GROOMS_TOO_MANY the job's options */
+    char *inputs;           /* of GROOMS_TOO_MANY */
+    uint32_t n_strands;     /* that are edited */
+};
+
+/* edited   the caller's, grooms_layer_edited_finish */
+GROOM_MUST_CHECK groom_status grooms_edit_layer(struct grooms *grooms, const struct grooms_layer_edit *edit,
+                                                struct grooms_layer_edited *edited, struct groom_diag *diag);
+void grooms_layer_edited_finish(struct grooms_layer_edited *edited); /* takes zeroed */
 
 /* --- what is evaluated -------------------------------------------------------------------------- */
 

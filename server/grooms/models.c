@@ -24,8 +24,10 @@ groom_status models_create(size_t max_bytes, struct models **out)
 
 static void free_model(struct model *model)
 {
-    if (model)
+    if (model) {
         groom_destroy(model->groom);
+        free(model->keys);
+    }
     free(model);
 }
 
@@ -44,7 +46,13 @@ void models_destroy(struct models *models)
 static size_t size_of(const struct groom *groom)
 {
     size_t n = groom->n_strands, points = (size_t)groom->n_guides * groom->n_vertices;
-    return n * (20 + 8 * (size_t)groom->n_instancing + 4 * (size_t)groom->n_operators) + points * 12;
+    size_t bytes = n * (20 + 8 * (size_t)groom->n_instancing + 4 * (size_t)groom->n_operators) + points * 12;
+    for (uint32_t i = 0; i < groom->n_operators; i++) {
+        const struct groom_layer *layer = groom->operators[i].layer;
+        if (layer)
+            bytes += 20 * ((size_t)layer->anchors.n + layer->contact.n) + (layer->target ? layer->target->n_vertices * 12 : 0);
+    }
+    return bytes + (size_t)groom->n_base * 12;
 }
 
 /* --- with the lock held ------------------------------------------------------------------ */
@@ -126,6 +134,8 @@ static groom_status load(struct grooms *grooms, const char *groom_id, uint32_t n
     groom_status status = documents_load(grooms, groom_id, number, &revision, &document, diag);
     if (status == GROOM_OK)
         status = decode(grooms, &revision, document, &model->groom, diag);
+    if (status == GROOM_OK && evaluate_keys(document, &model->keys) != GROOM_OK)
+        status = groom_fail(diag, GROOM_ENOMEM, "no memory for a groom");
     if (status != GROOM_OK)
         goto out;
     memcpy(model->groom_id, revision.groom_id, sizeof model->groom_id);

@@ -78,6 +78,14 @@ int grooms_check_edit(struct request *request);
 void grooms_call_revert(struct request *request);
 void grooms_call_preview(struct request *request);
 
+/* layer_calls.c */
+void layers_call_ruffle(struct request *request);
+void layers_call_sculpt(struct request *request);
+void layers_call_interpolate(struct request *request);
+void layers_call_curl_scale(struct request *request);
+int layers_check(struct request *request);
+
+
 /* analysis_calls.c: strands in curvature space, of grooms and of uploads */
 void analysis_call_groom(struct request *request);
 void analysis_call_strands(struct request *request);

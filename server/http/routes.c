@@ -53,6 +53,15 @@ const struct route http_routes[] = {
     {"GET", "/v1/grooms/{id}/analysis", analysis_call_groom, BODY_NONE, LANE_SLOW, "revision count elements tolerance straight_below wavy_below arrays format", 0, NULL},
     {"GET", "/v1/grooms/{id}/clusters", clusters_call_groom, BODY_NONE, LANE_SLOW, "revision count seed frames", 0, NULL},
 
+    {"POST", "/v1/grooms/{id}/ruffle", layers_call_ruffle, BODY_FILE, LANE_SLOW, "", 0, layers_check},
+    {"POST", "/v1/grooms/{id}/sculpt", layers_call_sculpt, BODY_FILE, LANE_SLOW, "", 0, layers_check},
+    {"POST", "/v1/grooms/{id}/interpolate", layers_call_interpolate, BODY_FILE, LANE_SLOW, "", 0, layers_check},
+    {"POST", "/v1/grooms/{id}/curl-scale", layers_call_curl_scale, BODY_FILE, LANE_SLOW, "", 0, layers_check},
+    {"POST", "/v1/strands/{id}/ruffle", layers_call_ruffle, BODY_FILE, LANE_SLOW, "", 0, layers_check},
+    {"POST", "/v1/strands/{id}/sculpt", layers_call_sculpt, BODY_FILE, LANE_SLOW, "", 0, layers_check},
+    {"POST", "/v1/strands/{id}/interpolate", layers_call_interpolate, BODY_FILE, LANE_SLOW, "", 0, layers_check},
+    {"POST", "/v1/strands/{id}/curl-scale", layers_call_curl_scale, BODY_FILE, LANE_SLOW, "", 0, layers_check},
+
     {"GET", "/v1/work/job", work_call_job, BODY_NONE, LANE_FAST, "", ROUTE_WORK, NULL},
     {"GET", "/v1/work/blobs/{sha256}", work_call_blob, BODY_NONE, LANE_FAST, "", ROUTE_WORK, NULL},
     {"POST", "/v1/work/progress", work_call_progress, BODY_MEMORY, LANE_FAST, "", ROUTE_WORK | ROUTE_QUIET, NULL},

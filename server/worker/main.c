@@ -16,6 +16,9 @@ static const struct command {
     {"convert", worker_convert,
      "[--from-format F] [--from-unit U] [--from-up y|z] --to-format F [--unit U] [--up y|z]\n"
      "                 [--vertices M] [--count N]   strands on standard input, another file on standard output"},
+    {"convert-head", worker_convert_head,
+     "[--format F] [--unit U] [--up y|z]\n"
+     "                 a head on standard input; what was understood of it, as OBJ in metres, on standard output"},
     {"check-groom", worker_check_groom, "a groom document on standard input; its canonical form on standard output"},
     {"render", worker_render,
      "[--unit U] [--up y|z] [--head FILE] [--head-unit U] [--head-up y|z] [--view V] [--size N]\n"

@@ -20,6 +20,7 @@ enum { WORKER_OK = 0, WORKER_FAILED = 1, WORKER_USAGE = 2 };
 /* The commands: argv[0] is the command's own name. They return the exit status. */
 int worker_inspect(int argc, char **argv);
 int worker_convert(int argc, char **argv);
+int worker_convert_head(int argc, char **argv);
 int worker_check_groom(int argc, char **argv);
 int worker_render(int argc, char **argv);
 int worker_compare(int argc, char **argv);

@@ -79,6 +79,9 @@ test('every operation answers as it is described', async (t) => {
   for (const at of [groom, `/v1/strands/${strands.id}`]) {
     await get(`${at}/analysis`);
     await get(`${at}/clusters?count=3`);
+    for (const [kind, body] of Object.entries({ ruffle: {}, sculpt: { anchors: [{ strand: 0, at: 1, position: [0, 1.6, 0] }] },
+      interpolate: { groom: done.result.groom }, 'curl-scale': { radius: 1.2 } }))
+      await expect(daemon, 201, 'POST', `${at}/${kind}`, { body });
   }
 
   const other = (await expect(daemon, 201, 'POST', '/v1/grooms', { body: groom_document() })).json.groom;

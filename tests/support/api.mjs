@@ -82,7 +82,7 @@ export const head_obj = () => {
   return lines.join('\n') + '\n';
 };
 
-const array = (dtype, shape, values) => {
+export const array = (dtype, shape, values) => {
   const typed = dtype === 'f32' ? Float32Array.from(values) : Uint32Array.from(values);
   return { dtype, shape, data: Buffer.from(typed.buffer).toString('base64') };
 };

@@ -86,6 +86,23 @@ GROOM_MUST_CHECK groom_status groom_document_write(const struct groom *groom, co
                                                    const struct groom_array_keeper *keeper, char **json,
                                                    size_t *n_bytes, struct groom_diag *diag);
 
+/* One operator alone: the same object as in a document's "operators".
+ * read     inserted at `index` of the groom; pointers are below /operators/<index>. Without an "id" it gets
+ *          the next free one. The groom is as it was on error
+ * write    json is released with free() */
+GROOM_MUST_CHECK groom_status groom_document_operator_read(const char *json, size_t n_bytes,
+                                                           const struct groom_array_finder *finder,
+                                                           struct groom *groom, uint32_t index,
+                                                           struct groom_diag *diag);
+GROOM_MUST_CHECK groom_status groom_document_operator_write(const struct groom *groom, uint32_t index,
+                                                            const struct groom_array_keeper *keeper, char **json,
+                                                            size_t *n_bytes, struct groom_diag *diag);
+
+/* An array as it stands in a document, inline: f32 or u32 (is_float 0) of this shape (1 to 3 dimensions).
+ * json is released with free(). returns GROOM_OK, GROOM_ENOMEM */
+GROOM_MUST_CHECK groom_status groom_document_array_write(const void *elements, int is_float, const uint32_t *shape,
+                                                         uint32_t n_dimensions, char **json, size_t *n_bytes);
+
 /* The same document with its arrays standing another way, the groom itself not looked at.
  * inline_arrays        replace references by their bytes */
 GROOM_MUST_CHECK groom_status groom_document_inline(const char *json, size_t n_bytes,

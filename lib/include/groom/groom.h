@@ -247,6 +247,13 @@ GROOM_MUST_CHECK groom_status groom_remove_operator(struct groom *groom, uint32_
 /* Take the operator at `from` out and put it back so that it stands at `to`. */
 GROOM_MUST_CHECK groom_status groom_move_operator(struct groom *groom, uint32_t from, uint32_t to,
                                                   struct groom_diag *diag);
+/* A groom that borrows all of `groom`, its operators as well, but for the one at `without` (n_operators: none
+ * is left out), and to whose chain one operator may be added: what an edit tries before it is taken.
+ * returns  GROOM_OK, GROOM_ENOMEM */
+GROOM_MUST_CHECK groom_status groom_borrow(const struct groom *groom, uint32_t without, struct groom *copy,
+                                           struct groom_diag *diag);
+/* Ends it, with the operator that was added at `added` (n_operators: none was). */
+void groom_borrow_end(struct groom *copy, uint32_t added);
 /* Draw an operator's random numbers anew and keep the seed: a function of (seed, operator id, strand
  * or operator guide), whatever else is in the chain. `op` belongs to `groom`. */
 void groom_draw_random(struct groom *groom, struct groom_operator *op, uint64_t seed);

@@ -43,6 +43,13 @@ GROOM_MUST_CHECK groom_status groom_layers_evaluate(const struct groom *groom, c
  * strength are moved. */
 struct groom_layer_input;
 
+/* How many strands the layer at `index` may change.
+ * returns  as groom_layer_input_create */
+GROOM_MUST_CHECK groom_status groom_layer_count(const struct groom *groom, uint32_t index,
+                                                const struct groom_strands *before,
+                                                const struct groom_context *context, uint32_t *n,
+                                                struct groom_diag *diag);
+
 /* For the layer at `index`.
  * before   the strands that come into it; borrowed for the call
  * returns  GROOM_OK, GROOM_EINVAL (a cluster that a frame moves is empty: /operators/<index>/frames/<i>/cluster),

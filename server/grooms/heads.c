@@ -1,0 +1,182 @@
+/* Surfaces of uploaded heads, for contact: read by groom-worker, which writes what it has understood, and
+ * kept while they are asked for. */
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "groom/mesh.h"
+#include "groom/spatial.h"
+#include "server/grooms/room.h"
+#include "server/launch/child.h"
+
+#define MOST_HEADS 4
+#define CONVERT_WALL_MS 60000
+#define CONVERT_MEMORY ((uint64_t)8 << 30)
+#define CONVERT_FILE ((uint64_t)4 << 30)
+
+struct head {
+    char id[STORE_ID_SIZE];
+    struct groom_mesh *mesh;
+    struct groom_bvh *bvh;
+    unsigned n_users;
+    uint64_t last_used;
+    struct head *next;
+};
+
+struct heads {
+    pthread_mutex_t lock;
+    struct head *first;
+    uint64_t clock;
+};
+
+groom_status heads_create(struct heads **out)
+{
+    struct heads *heads = calloc(1, sizeof *heads);
+    if (!heads)
+        return GROOM_ENOMEM;
+    pthread_mutex_init(&heads->lock, NULL);
+    *out = heads;
+    return GROOM_OK;
+}
+
+static void free_head(struct head *head)
+{
+    if (!head)
+        return;
+    groom_bvh_destroy(head->bvh);
+    groom_mesh_destroy(head->mesh);
+    free(head);
+}
+
+void heads_destroy(struct heads *heads)
+{
+    if (!heads)
+        return;
+    for (struct head *head = heads->first, *next; head; head = next) {
+        next = head->next;
+        free_head(head);
+    }
+    pthread_mutex_destroy(&heads->lock);
+    free(heads);
+}
+
+const struct groom_bvh *head_surface(const struct head *head) { return head->bvh; }
+
+/* --- reading one --------------------------------------------------------------------------- */
+
+static groom_status convert(struct grooms *grooms, const struct store_asset *asset, int in, int out,
+                            struct groom_diag *diag)
+{
+    char unit[32], up[2] = {asset->up, 0};
+    snprintf(unit, sizeof unit, "%.17g", asset->unit_m);
+    const char *const argv[] = {grooms->options.worker_path, "convert-head", "--format", asset->format, "--unit", unit, "--up", up, NULL};
+    const struct child_spec spec = {.argv = argv, .stdin_fd = in, .stdout_fd = out, .wall_ms = CONVERT_WALL_MS,
+                                    .limits = {.memory_bytes = CONVERT_MEMORY, .file_bytes = CONVERT_FILE}};
+    struct child_result result = {0};
+    groom_status status = child_run(&spec, &result, diag);
+    if (status == GROOM_OK && result.exit_status != 0)
+        status = groom_fail(diag, GROOM_EINTERNAL, "the head could not be read%s: %.300s",
+                            result.timed_out ? " in time" : "", result.words);
+    child_result_finish(&result);
+    return status;
+}
+
+static groom_status read_mesh(struct grooms *grooms, int fd, struct head *head, struct groom_diag *diag)
+{
+    const struct groom_mesh_read_options options = {.format = GROOM_MESH_OBJ};
+    if (lseek(fd, 0, SEEK_SET) != 0)
+        return groom_fail(diag, GROOM_EIO, "a head could not be read back");
+    struct groom_source source = groom_source_from_fd(fd);
+    groom_status status = groom_mesh_read(&source, &options, &grooms->context, &head->mesh, NULL, diag);
+    return status == GROOM_OK ? groom_bvh_create(head->mesh, &grooms->context, &head->bvh, diag) : status;
+}
+
+static groom_status load(struct grooms *grooms, const struct store_asset *asset, struct head *head,
+                         struct groom_diag *diag)
+{
+    int in = -1, out = -1;
+    uint64_t n_bytes;
+    groom_status status = blobs_read(grooms->options.blobs, asset->sha256, &in, &n_bytes, diag);
+    if (status == GROOM_OK && (out = open(grooms->options.temporary_folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600)) < 0)
+        status = groom_fail(diag, GROOM_EIO, "no temporary file");
+    if (status == GROOM_OK)
+        status = convert(grooms, asset, in, out, diag);
+    if (status == GROOM_OK)
+        status = read_mesh(grooms, out, head, diag);
+    if (in >= 0)
+        close(in);
+    if (out >= 0)
+        close(out);
+    return status;
+}
+
+/* --- what others call ---------------------------------------------------------------------------- */
+
+/* With the lock held. */
+static struct head *find(struct heads *heads, const char *id)
+{
+    for (struct head *head = heads->first; head; head = head->next)
+        if (strcmp(head->id, id) == 0) {
+            head->n_users++;
+            head->last_used = ++heads->clock;
+            return head;
+        }
+    return NULL;
+}
+
+/* With the lock held. */
+static void make_room(struct heads *heads)
+{
+    size_t n = 0;
+    struct head **oldest = NULL;
+    for (struct head **link = &heads->first; *link; link = &(*link)->next, n++)
+        if ((*link)->n_users == 0 && (!oldest || (*link)->last_used < (*oldest)->last_used))
+            oldest = link;
+    if (n <= MOST_HEADS || !oldest)
+        return;
+    struct head *head = *oldest;
+    *oldest = head->next;
+    free_head(head);
+}
+
+groom_status heads_acquire(struct grooms *grooms, const char *id, struct head **out, struct groom_diag *diag)
+{
+    struct heads *heads = grooms->heads;
+    struct store_asset asset = {0};
+    pthread_mutex_lock(&heads->lock);
+    *out = find(heads, id);
+    pthread_mutex_unlock(&heads->lock);
+    if (*out || store_asset_get(grooms->options.store, STORE_HEAD, id, &asset, NULL) != GROOM_OK)
+        return GROOM_OK; /* a groom from elsewhere: its head is not here */
+    struct head *made = calloc(1, sizeof *made);
+    groom_status status = made ? load(grooms, &asset, made, diag) : groom_fail(diag, GROOM_ENOMEM, "no memory for a head");
+    store_asset_finish(&asset);
+    if (status != GROOM_OK) {
+        free_head(made);
+        return status;
+    }
+    strncpy(made->id, id, sizeof made->id - 1);
+    pthread_mutex_lock(&heads->lock);
+    if (!(*out = find(heads, id))) {
+        made->next = heads->first;
+        heads->first = made;
+        *out = find(heads, id);
+        made = NULL;
+        make_room(heads);
+    }
+    pthread_mutex_unlock(&heads->lock);
+    free_head(made);
+    return GROOM_OK;
+}
+
+void heads_release(struct grooms *grooms, struct head *head)
+{
+    if (!head)
+        return;
+    pthread_mutex_lock(&grooms->heads->lock);
+    head->n_users--;
+    make_room(grooms->heads);
+    pthread_mutex_unlock(&grooms->heads->lock);
+}
