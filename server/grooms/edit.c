@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "proto/json_patch.h"
+#include "proto/json_text.h"
 #include "server/grooms/room.h"
 
 groom_status edit_begin(struct edit *edit)
@@ -105,11 +106,9 @@ groom_status edit_prepare_tree(struct edit *edit, char **text, struct store_arra
 
 static groom_status parse_patch(const char *text, size_t n_bytes, cJSON **patch, struct groom_diag *diag)
 {
-    const char *end = NULL;
-    *patch = cJSON_ParseWithLengthOpts(text, n_bytes, &end, 0);
-    if (!*patch)
-        return groom_fail_at(diag, GROOM_EINVAL, end ? end - text : 0, "the patch is not JSON");
-    return GROOM_OK;
+    struct json_text_error error;
+    *patch = json_text_parse(text, n_bytes, &error);
+    return *patch ? GROOM_OK : groom_fail_at(diag, GROOM_EINVAL, error.byte_offset, "the patch: %s", error.detail);
 }
 
 static groom_status apply_json_patch(const cJSON *document, const cJSON *patch, cJSON **patched,

@@ -90,14 +90,28 @@ static const char bad_request[] = "the request cannot be understood";
 
 struct lengths {
     int n_hosts, n_lengths, n_codings;
-    bool chunked;
+    bool chunked, garbled;
     const char *length, *host;
 };
+
+/* libmicrohttpd 0.9.75 glues a folded line ("Transfer-Encoding:", then " chunked") to the name before it,
+ * and takes the header for an unknown one; another program on the way would not. */
+static bool is_garbled(const char *name)
+{
+    static const char *const framing[] = {"Transfer-Encoding", "Content-Length", "Host"};
+    for (size_t i = 0; i < sizeof framing / sizeof framing[0]; i++) {
+        size_t n = strlen(framing[i]);
+        if (!strncasecmp(name, framing[i], n) && name[n])
+            return true;
+    }
+    return false;
+}
 
 static enum MHD_Result count_header(void *user, enum MHD_ValueKind kind, const char *name, const char *value)
 {
     struct lengths *lengths = user;
     (void)kind;
+    lengths->garbled |= is_garbled(name);
     if (!strcasecmp(name, "Host")) {
         lengths->n_hosts++;
         lengths->host = value;
@@ -126,7 +140,7 @@ static bool read_length(struct request *request)
         request->close = true;
         return false;
     }
-    if (lengths.n_lengths > 1 || lengths.n_codings > 1 || (lengths.n_lengths && lengths.n_codings) ||
+    if (lengths.garbled || lengths.n_lengths > 1 || lengths.n_codings > 1 || (lengths.n_lengths && lengths.n_codings) ||
         (lengths.n_codings && !lengths.chunked)) {
         respond_refusal(request, 400, "bad-request", bad_request,
                         "send one Content-Length, or Transfer-Encoding: chunked, and not both");

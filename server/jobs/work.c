@@ -9,6 +9,7 @@
 #include <cjson/cJSON.h>
 #include <openssl/evp.h>
 
+#include "proto/json_text.h"
 #include "server/jobs/queue.h"
 
 /* --- tokens ---------------------------------------------------------------------------- */
@@ -227,7 +228,7 @@ groom_status work_result(struct jobs *jobs, const struct store_attempt_ref *ref,
 /* A problem object, printed anew: what is kept is JSON whatever was sent. */
 static groom_status read_problem(const char *body, size_t n_body, char **text, struct groom_diag *diag)
 {
-    cJSON *problem = cJSON_ParseWithLength(body, n_body);
+    cJSON *problem = json_text_parse(body, n_body, NULL);
     bool good = cJSON_IsObject(problem) &&
                 cJSON_IsString(cJSON_GetObjectItemCaseSensitive(problem, "type")) &&
                 cJSON_IsString(cJSON_GetObjectItemCaseSensitive(problem, "detail"));
@@ -266,7 +267,7 @@ groom_status work_failed(struct jobs *jobs, const struct store_attempt_ref *ref,
 groom_status work_ended(struct jobs *jobs, const struct store_attempt_ref *ref, const char *body, size_t n_body,
                         struct groom_diag *diag)
 {
-    cJSON *json = cJSON_ParseWithLength(body, n_body);
+    cJSON *json = json_text_parse(body, n_body, NULL);
     const char *words = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(json, "words"));
     groom_status status = words && strlen(words) <= WORK_MAX_WORDS
                               ? store_attempt_ended(jobs->store, ref, words, diag)

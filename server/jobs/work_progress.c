@@ -5,6 +5,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "proto/json_text.h"
 #include "server/jobs/queue.h"
 #include "server/jobs/work.h"
 
@@ -190,7 +191,7 @@ groom_status work_progress(struct jobs *jobs, const struct store_attempt_ref *re
                            bool *cancel, struct groom_diag *diag)
 {
     struct store_job job = {0};
-    cJSON *message = cJSON_ParseWithLength(body, n_body);
+    cJSON *message = json_text_parse(body, n_body, NULL);
     groom_status status = check_message(message, diag);
     if (status == GROOM_OK)
         status = store_job_get(jobs->store, ref->job_id, &job, diag);
