@@ -16,9 +16,13 @@ struct groom_conversion_options groom_conversion_options_default(void)
 
 /* Every array of convert_space, with its length, once: X(member, count). */
 #define SPACE_ARRAYS(X)                                                                            \
-    X(spline.point, nv) X(spline.slope, nv) X(spline.h, nv) X(spline.arc, nv) X(spline.work, nv)   \
+    X(spline.point, nv) X(spline.slope, nv) X(spline.h, nv + 3) X(spline.arc, nv) X(spline.work, nv)   \
+    X(spline.rate, 9 * (nv + 3))                                                                   \
     X(vertex, nv) X(knot, nv) X(flips, nv) X(breaks, ne + 1) X(p, ne + 1) X(t, ne + 1)             \
     X(work, 2 * ne) X(refine.element, ne) X(refine.kept, 4 * ne) X(refine.junction, ne + 1)        \
+    X(refine.moved, ne + 1) X(refine.trig.x, ne + nv + 3) X(refine.trig.A, ne + nv + 3)                    \
+    X(refine.trig.B, ne + nv + 3) X(refine.trig.C, ne + nv + 3) X(refine.trig.B1, ne + nv + 3)                 \
+    X(refine.trig.C1, ne + nv + 3)                                                                     \
     X(fits[0].strand.length, ne) X(fits[0].strand.q, ne) X(fits[0].strand.element, nv)             \
     X(fits[0].strand.fraction, nv) X(fits[0].strand.fitted, nv)                                    \
     X(fits[1].strand.length, ne) X(fits[1].strand.q, ne) X(fits[1].strand.element, nv)             \

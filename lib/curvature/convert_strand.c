@@ -5,10 +5,14 @@
 #include <string.h>
 
 #include "curvature/helix.h"
+#include "curvature/helix_rows.h"
 
 #define ELEMENTS_A_TURN 3.5
 /* Handedness flips where the torsion angle has gone at least this far both ways (radians). */
 #define FLIP_ANGLE 0.6
+/* Strands that smooth elements miss by more than this many tolerances are taken with their corners: curvatures
+ * there are as large as corners are short. */
+#define CORNERS_BEYOND 2.0
 /* Planes of less bending than this (radians) have no torsion worth the name. */
 #define LEAST_BEND 0.03
 
@@ -180,21 +184,31 @@ static void place_vertices(const struct convert_space *space, struct refine_stra
     }
 }
 
+/* Darboux vectors in the world (in q) to those in the material frame, which is carried along. */
+static void into_frames(const struct trig_rows *trig, struct refine_strand *strand, uint32_t n)
+{
+    mat3 F = strand->root;
+    for (uint32_t j = 0; j < n; j++) {
+        vec3 theta = vec_scale(strand->length[j], vec_of(strand->q[j]));
+        trig->x[j] = vec_dot(theta, theta);
+    }
+    memset(trig->x + n, 0, 3 * sizeof *trig->x);
+    trig_rows(trig, n);
+    for (uint32_t j = 0; j < n; j++) {
+        vec3 omega = vec_of(strand->q[j]), theta = vec_scale(strand->length[j], omega);
+        vec_store(mat_transposed_vec(F, omega), strand->q[j]);
+        F = mat_mul(element_turn(trig->A[j], trig->B[j], trig->x[j], theta), F);
+    }
+}
+
 /* Floating tangents on the breaks, then one helix after the other. */
 static void closed_form(struct convert_space *space, struct refine_strand *strand, uint32_t n)
 {
-    uint32_t segment = 0;
-    for (uint32_t i = 0; i <= n; i++)
-        spline_at(&space->spline, space->breaks[i], &segment, &space->p[i], &space->t[i]);
+    spline_at(&space->spline, space->breaks, n + 1, space->p, space->t);
     helix_float_points(n, space->p, space->t, space->work);
-    mat3 F = strand->root = root_frame(space->t[0]);
-    for (uint32_t j = 0; j < n; j++) {
-        struct helix helix = helix_through(space->p[j], space->t[j], space->p[j + 1], space->t[j + 1]);
-        vec3 q = mat_transposed_vec(F, helix.omega);
-        vec_store(q, strand->q[j]);
-        strand->length[j] = helix.length;
-        F = chain_step((struct chain_state){space->p[j], F}, q, helix.length).F;
-    }
+    helix_chain(n, (const double (*)[3])space->p, (const double (*)[3])space->t, strand->q, strand->length);
+    strand->root = root_frame(space->t[0]);
+    into_frames(&space->refine.trig, strand, n);
 }
 
 /* Fit n elements on the breaks at hand into fits[which]. */
@@ -208,6 +222,64 @@ static void fit_breaks(struct convert_space *space, uint32_t which, uint32_t n, 
     closed_form(space, &fit->strand, n);
     place_vertices(space, &fit->strand, n_vertices);
     fit->sum = refine_fit(&fit->strand, &space->refine, n_steps, tolerance, &fit->worst);
+}
+
+/* --- corners ------------------------------------------------------------------------------- */
+
+/* Corners take so little of a mean segment, and of each one. */
+#define CORNER_SHARE 1e-3
+
+struct walk {
+    vec3 p;
+    mat3 F;
+    uint32_t n_elements;
+};
+
+static void walk_element(struct walk *w, struct refine_strand *strand, vec3 q, double length)
+{
+    vec_store(q, strand->q[w->n_elements]);
+    strand->length[w->n_elements++] = length;
+    struct chain_state end = chain_step((struct chain_state){w->p, w->F}, q, length);
+    w->p = end.p;
+    w->F = end.F;
+}
+
+/* Turn the tangent to where the knot lies, within a length that is next to nothing. */
+static void walk_corner(struct walk *w, struct refine_strand *strand, vec3 to, double length)
+{
+    vec3 local = mat_transposed_vec(w->F, vec_sub(to, w->p)); /* forward, and aside */
+    double aside = sqrt(local.y * local.y + local.z * local.z), angle = atan2(aside, local.x);
+    vec3 axis = aside > 0.0 ? (vec3){0.0, -local.z / aside, local.y / aside} : (vec3){0.0, 1.0, 0.0};
+    walk_element(w, strand, vec_scale(angle / length, axis), length);
+}
+
+/* The polyline as it is: a straight element for each segment, and between them short ones that turn. Each aims
+ * anew, so that what a corner is long does not add up. For strands that fold back on themselves so
+ * often that no smooth curve comes near. */
+static void fit_corners(struct convert_space *space, uint32_t which, uint32_t n_vertices)
+{
+    const struct spline *s = &space->spline;
+    struct refine_strand *strand = &space->fits[which].strand;
+    double length = 0.0;
+    for (uint32_t k = 0; k + 1 < s->n; k++)
+        length += s->h[k];
+    struct walk w = {.p = s->point[0]};
+    vec3 t = vec_sub(s->point[1], s->point[0]);
+    w.F = strand->root = root_frame(vec_scale(1.0 / s->h[0], t));
+    for (uint32_t k = 0, v = 0; k + 1 < s->n; k++) {
+        if (k)
+            walk_corner(&w, strand, s->point[k + 1], CORNER_SHARE * fmin(s->h[k], length / (s->n - 1)));
+        for (; v < n_vertices && space->knot[v] <= k + 1; v++) {
+            strand->element[v] = w.n_elements;
+            strand->fraction[v] = space->knot[v] == k + 1;
+        }
+        t = vec_sub(s->point[k + 1], w.p);
+        walk_element(&w, strand, (vec3){0.0, 0.0, 0.0}, sqrt(vec_dot(t, t)));
+    }
+    strand->n_elements = w.n_elements;
+    strand->n_vertices = n_vertices;
+    strand->vertex = space->vertex;
+    space->fits[which].sum = refine_fit(strand, &space->refine, 0, 0.0, &space->fits[which].worst);
 }
 
 /* --- how many elements -------------------------------------------------------------------- */
@@ -231,15 +303,23 @@ static void attempt(struct convert_space *space, const struct request *r, uint32
         space->best = &space->fits[which];
 }
 
+static void attempt_corners(struct convert_space *space, const struct request *r)
+{
+    uint32_t which = space->best == &space->fits[0];
+    fit_corners(space, which, r->n_vertices);
+    if (is_better(&space->fits[which], space->best))
+        space->best = &space->fits[which];
+}
+
 static int is_met(const struct convert_space *space, const struct request *r)
 {
     return space->best && space->best->worst <= r->tolerance;
 }
 
-/* The error of the closed form falls with the third power of the count, roughly. */
+/* The error falls with the second to third power of the count: less often asked than right is cheaper. */
 static uint32_t next_count(uint32_t n, double excess)
 {
-    double more = n * fmin(fmax(cbrt(excess), 1.15), 2.5);
+    double more = n * fmin(fmax(pow(excess, 1.0 / 2.2), 1.15), 2.5);
     return (uint32_t)ceil(more) + 1;
 }
 
@@ -250,9 +330,11 @@ static void search_uniform(struct convert_space *space, const struct groom_conve
     uint32_t n = (uint32_t)ceil(ELEMENTS_A_TURN * count_turns(&space->spline));
     n = n > options->min_elements ? n : options->min_elements;
     most = most < space->spline.n ? most : space->spline.n;
+    struct request quick = *r; /* two steps tell whether so many elements will do */
+    quick.n_steps = r->n_steps < 2 ? r->n_steps : 2;
     while (n < most && !is_met(space, r)) {
         uniform_breaks(space, n, r->n_flips);
-        attempt(space, r, n);
+        attempt(space, &quick, n);
         n = next_count(n, space->best->worst / r->tolerance);
     }
 }
@@ -270,6 +352,9 @@ static void search_count(struct convert_space *space, const struct groom_convers
         uniform_breaks(space, most, r->n_flips);
         attempt(space, r, most);
     }
+    if (space->best->worst > CORNERS_BEYOND * r->tolerance && 2 * knots - 3 <= most &&
+        2 * knots - 3 >= options->min_elements)
+        attempt_corners(space, r);
 }
 
 /* --- one strand ----------------------------------------------------------------------------- */

@@ -1,7 +1,7 @@
 /* Least squares on the kernel for this processor. */
 #include "curvature/refine.h"
 
-double refine_fit(struct refine_strand *strand, const struct refine_space *space, uint32_t n_steps,
+double refine_fit(struct refine_strand *strand, struct refine_space *space, uint32_t n_steps,
                   double tolerance, double *worst)
 {
 #if defined(__x86_64__) && defined(__GNUC__)

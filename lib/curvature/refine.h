@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "curvature/chain.h"
+#include "curvature/trig_rows.h"
 
 /* One strand while it is fitted. Coordinates are relative to its root. */
 struct refine_strand {
@@ -34,18 +35,21 @@ struct refine_element {
 struct refine_space {
     struct refine_element *element; /* [n_elements] */
     double *kept;                   /* [4 n_elements] lengths and q before a step */
-    struct chain_state *junction;   /* [n_elements + 1] */
+    struct chain_state *junction;   /* [n_elements + 1] where elements begin */
+    struct chain_state *moved;      /* [n_elements + 1] ... after the step that is tried */
+    struct trig_rows trig;          /* [n_elements + n_vertices + 3] of whole elements, then of their parts before
+                                       each vertex */
 };
 
 /* Gauss-Newton with Levenberg-Marquardt damping on q, lengths and the root frame, at most n_steps;
  * stops early where no vertex is farther than `tolerance`. Linear in elements and vertices: the motion
  * beyond an element is a rigid one, so that the normal equations are eliminated tip to root in 6x6
  * blocks (the Riccati recursion). Returns the sum of squares, never more than before. */
-double refine_fit(struct refine_strand *strand, const struct refine_space *space, uint32_t n_steps,
+double refine_fit(struct refine_strand *strand, struct refine_space *space, uint32_t n_steps,
                   double tolerance, double *worst);
 
 /* The same, per instruction set. */
-typedef double refine_fit_function(struct refine_strand *, const struct refine_space *, uint32_t, double, double *);
+typedef double refine_fit_function(struct refine_strand *, struct refine_space *, uint32_t, double, double *);
 refine_fit_function refine_fit_generic, refine_fit_avx2;
 
 #endif

@@ -1,5 +1,5 @@
 /* The least-squares fit of a super-helix, the text that is compiled once per instruction set. The
- * including file defines REFINE_FIT, the name of the function. Every variant gives the same bits: rows are
+ * including file defines REFINE_FIT, the name of the function, and REFINE_TRIG, that of its trig_rows. Every variant gives the same bits: rows are
  * added up in the same order, and nothing is contracted. */
 #ifndef CURVATURE_REFINE_KERNEL_H
 #define CURVATURE_REFINE_KERNEL_H
@@ -10,6 +10,9 @@
 
 #include <math.h>
 #include <string.h>
+
+/* Where the model's forecast misses by less than this share of what is left, it has found the minimum. */
+#define CONVERGED 0.2
 
 /* A rigid motion about the root: x moves by shift + turn x x. Kept as 6 numbers, turn first. In these
  * coordinates a motion of an element's begin carries everything beyond along unchanged. */
@@ -31,22 +34,63 @@ CURVATURE_INLINE void row_add(struct refine_row8 *a, double s, const struct refi
     a->high += all_of(s) * b->high;
 }
 
-/* Fill `fitted`; the sum of squared distances, *worst the largest distance. */
-static double measure(struct refine_strand *strand, double *worst)
+/* --- where the curve is ----------------------------------------------------------- */
+
+/* The angles squared of whole elements and of their parts before each vertex. */
+static void fill_angles(const struct refine_strand *strand, double *x)
 {
-    struct chain_state at = {{0.0, 0.0, 0.0}, strand->root};
-    double sum = 0.0, most = 0.0;
-    uint32_t k = 0;
-    for (uint32_t j = 0; j < strand->n_elements; j++) {
+    uint32_t n = strand->n_elements, k = 0;
+    for (uint32_t j = 0; j < n; j++) {
         vec3 q = vec_of(strand->q[j]);
+        double square = vec_dot(q, q), l = strand->length[j];
+        x[j] = square * l * l;
         for (; k < strand->n_vertices && strand->element[k] == j; k++) {
-            strand->fitted[k] = chain_point(at, q, strand->fraction[k] * strand->length[j]);
-            vec3 miss = vec_sub(strand->fitted[k], strand->vertex[k]);
-            double square = vec_dot(miss, miss);
-            sum += square;
-            most = square > most ? square : most;
+            double s = strand->fraction[k] * l;
+            x[n + k] = square * s * s;
         }
-        at = chain_step(at, q, strand->length[j]);
+    }
+}
+
+CURVATURE_INLINE trig5 trig_at(const struct trig_rows *t, size_t i)
+{
+    return (trig5){t->A[i], t->B[i], t->C[i], t->B1[i], t->C1[i]};
+}
+
+static void walk_junctions(const struct refine_strand *strand, const struct trig_rows *t, struct chain_state *junction)
+{
+    junction[0] = (struct chain_state){{0.0, 0.0, 0.0}, strand->root};
+    for (uint32_t j = 0; j < strand->n_elements; j++) {
+        double l = strand->length[j], x = t->x[j];
+        vec3 theta = vec_scale(l, vec_of(strand->q[j]));
+        vec3 chord = vec_scale(l, element_chord(t->B[j], t->C[j], x, theta));
+        junction[j + 1].p = vec_add(junction[j].p, mat_vec(junction[j].F, chord));
+        junction[j + 1].F = mat_mul(junction[j].F, element_turn(t->A[j], t->B[j], x, theta));
+    }
+}
+
+/* Fill `trig` and `fitted`; the sum of squared distances, *worst the largest distance.
+ * junction  read where it is known, else written */
+static double measure(struct refine_strand *strand, const struct refine_space *space, struct chain_state *junction,
+                      int known, double *worst)
+{
+    const struct trig_rows *t = &space->trig;
+    uint32_t n = strand->n_elements;
+    double sum = 0.0, most = 0.0;
+    fill_angles(strand, t->x);
+    memset(t->x + n + strand->n_vertices, 0, 3 * sizeof *t->x);
+    REFINE_TRIG(t, n + strand->n_vertices);
+    if (!known)
+        walk_junctions(strand, t, junction);
+    for (uint32_t k = 0; k < strand->n_vertices; k++) {
+        uint32_t j = strand->element[k];
+        double s = strand->fraction[k] * strand->length[j];
+        vec3 theta = vec_scale(s, vec_of(strand->q[j]));
+        vec3 chord = vec_scale(s, element_chord(t->B[n + k], t->C[n + k], t->x[n + k], theta));
+        strand->fitted[k] = vec_add(junction[j].p, mat_vec(junction[j].F, chord));
+        vec3 miss = vec_sub(strand->fitted[k], strand->vertex[k]);
+        double square = vec_dot(miss, miss);
+        sum += square;
+        most = square > most ? square : most;
     }
     *worst = sqrt(most);
     return sum;
@@ -59,15 +103,12 @@ struct sight {
     vec3 column[4];
 };
 
-static struct sight sight_of(const struct chain_state *at, vec3 q, double length, double fraction,
-                             vec3 *point)
+CURVATURE_INLINE struct sight sight_of(const struct chain_state *at, vec3 q, double length, double fraction, trig5 f,
+                                       double x)
 {
     double s = fraction * length;
     vec3 theta = vec_scale(s, q);
-    double x = vec_dot(theta, theta);
-    trig5 f = trig5_of(x);
     mat3 D = mat_mul(at->F, element_derivative(f, x, theta, s));
-    *point = vec_add(at->p, mat_vec(at->F, vec_scale(s, element_chord(f.B, f.C, x, theta))));
     vec3 tangent = mat_vec(at->F, element_turn(f.A, f.B, x, theta).t);
     return (struct sight){{D.t, D.u, D.v, vec_scale(fraction, tangent)}};
 }
@@ -80,21 +121,17 @@ static void put_column(refine_row control[6], int c, vec3 turn, vec3 shift)
 
 /* What the controls of an element do to all that lies beyond it: the end turns by l F V dq + Omega dl
  * and moves; as a motion about the root, shift = move - turn x p_end. */
-static struct chain_state fill_control(const struct chain_state *at, vec3 q, double l,
-                                       refine_row control[6])
+static void fill_control(const struct chain_state *at, const struct chain_state *end, vec3 q, double l, trig5 f,
+                         double x, refine_row control[6])
 {
     vec3 theta = vec_scale(l, q);
-    double x = vec_dot(theta, theta);
-    trig5 f = trig5_of(x);
     mat3 V = element_mean(f.B, f.C, x, theta);
     mat3 turn = mat_scale(l, mat_mul(at->F, V)), move = mat_mul(at->F, element_derivative(f, x, theta, l));
-    struct chain_state end = {vec_add(at->p, turn.t), mat_mul(at->F, element_turn(f.A, f.B, x, theta))};
     vec3 omega = mat_vec(at->F, q);
-    put_column(control, 0, turn.t, vec_sub(move.t, vec_cross(turn.t, end.p)));
-    put_column(control, 1, turn.u, vec_sub(move.u, vec_cross(turn.u, end.p)));
-    put_column(control, 2, turn.v, vec_sub(move.v, vec_cross(turn.v, end.p)));
-    put_column(control, 3, omega, vec_sub(end.F.t, vec_cross(omega, end.p)));
-    return end;
+    put_column(control, 0, turn.t, vec_sub(move.t, vec_cross(turn.t, end->p)));
+    put_column(control, 1, turn.u, vec_sub(move.u, vec_cross(turn.u, end->p)));
+    put_column(control, 2, turn.v, vec_sub(move.v, vec_cross(turn.v, end->p)));
+    put_column(control, 3, omega, vec_sub(end->F.t, vec_cross(omega, end->p)));
 }
 
 /* What the vertices of one element add: sums over them. */
@@ -221,30 +258,32 @@ CURVATURE_INLINE int eliminate_controls(struct stage *g, struct refine_row8 gain
 
 /* --- the whole strand ---------------------------------------------------------------- */
 
-static void walk_junctions(const struct refine_strand *strand, const struct refine_space *space)
+static void fill_controls(const struct refine_strand *strand, const struct refine_space *space)
 {
-    struct chain_state at = {{0.0, 0.0, 0.0}, strand->root};
-    for (uint32_t j = 0; j < strand->n_elements; j++) {
-        space->junction[j] = at;
-        at = fill_control(&at, vec_of(strand->q[j]), strand->length[j], space->element[j].control);
-    }
+    const struct chain_state *at = space->junction;
+    for (uint32_t j = 0; j < strand->n_elements; j++)
+        fill_control(&at[j], &at[j + 1], vec_of(strand->q[j]), strand->length[j], trig_at(&space->trig, j),
+                     space->trig.x[j], space->element[j].control);
 }
 
 /* Tip to root. 0 where the damping is too small for the arithmetic. */
 static int eliminate(const struct refine_strand *strand, const struct refine_space *space, double damping,
                      struct quadratic *value)
 {
+    static const struct sums none;
     uint32_t k = strand->n_vertices;
     memset(value, 0, sizeof *value);
     for (uint32_t j = strand->n_elements; j-- > 0;) {
         struct refine_element *e = &space->element[j];
-        vec3 q = vec_of(strand->q[j]), x;
+        vec3 q = vec_of(strand->q[j]);
         struct sums own;
         struct stage g;
-        memset(&own, 0, sizeof own);
+        own = none;
         for (; k > 0 && strand->element[k - 1] == j; k--) {
-            struct sight see = sight_of(&space->junction[j], q, strand->length[j], strand->fraction[k - 1], &x);
-            add_vertex(&own, &see, x, vec_sub(x, strand->vertex[k - 1]));
+            size_t i = (size_t)strand->n_elements + k - 1;
+            struct sight see = sight_of(&space->junction[j], q, strand->length[j], strand->fraction[k - 1],
+                                        trig_at(&space->trig, i), space->trig.x[i]);
+            add_vertex(&own, &see, strand->fitted[k - 1], vec_sub(strand->fitted[k - 1], strand->vertex[k - 1]));
         }
         fill_stage(&g, value, e->control, &own, damping, strand->length[j]);
         add_motion(value, &own);
@@ -302,12 +341,13 @@ static void motion_between(const struct chain_state *was, const struct chain_sta
  * their second order from doing so. */
 static void apply(struct refine_strand *strand, const struct refine_space *space, const double turn[3])
 {
+    struct chain_state *at = space->moved;
     strand->root = turned(strand->root, turn);
-    struct chain_state at = {{0.0, 0.0, 0.0}, strand->root};
+    at[0] = (struct chain_state){{0.0, 0.0, 0.0}, strand->root};
     for (uint32_t j = 0; j < strand->n_elements; j++) {
         const struct refine_element *e = &space->element[j];
         double motion[6], w[4], l = strand->length[j];
-        motion_between(&space->junction[j], &at, motion);
+        motion_between(&space->junction[j], &at[j], motion);
         for (int c = 0; c < 4; c++) {
             w[c] = -row_at(&e->gain[c], 6);
             for (int i = 0; i < 6; i++)
@@ -316,7 +356,7 @@ static void apply(struct refine_strand *strand, const struct refine_space *space
         for (int c = 0; c < 3; c++)
             strand->q[j][c] += w[c];
         strand->length[j] = fmin(fmax(l + w[3], 0.5 * l), 2.0 * l);
-        at = chain_step(at, vec_of(strand->q[j]), strand->length[j]);
+        at[j + 1] = chain_step(at[j], vec_of(strand->q[j]), strand->length[j]);
     }
 }
 
@@ -333,33 +373,37 @@ static void restore(struct refine_strand *strand, const double *kept, mat3 root)
     strand->root = root;
 }
 
-/* One damped step; 1 where it went downhill. *left: what the model thinks can still be gained. */
-static int try_step(struct refine_strand *strand, const struct refine_space *space, double damping,
-                    double *sum, double *worst, double *left)
+/* One damped step; 1 where it went downhill. *left: what the model thinks can still be gained. Where it did not,
+ * `trig` and `fitted` are of the strand that was tried. */
+static int try_step(struct refine_strand *strand, struct refine_space *space, double damping, double *sum,
+                    double *worst, double *left)
 {
     struct quadratic value;
     double turn[3], far;
     mat3 root = strand->root;
     keep(strand, space->kept);
-    walk_junctions(strand, space);
+    fill_controls(strand, space);
     if (!eliminate(strand, space, damping, &value) || !root_turn(&value, damping, turn))
         return 0;
     apply(strand, space, turn);
-    double after = measure(strand, &far);
+    double after = measure(strand, space, space->moved, 1, &far);
     if (!(after < *sum)) { /* NaN counts as uphill */
         restore(strand, space->kept, root);
         return 0;
     }
+    struct chain_state *before = space->junction;
+    space->junction = space->moved;
+    space->moved = before;
     *left = fmax(after - (*sum - value.gained), 0.0);
     *sum = after;
     *worst = far;
     return 1;
 }
 
-double REFINE_FIT(struct refine_strand *strand, const struct refine_space *space, uint32_t n_steps,
-                  double tolerance, double *worst)
+double REFINE_FIT(struct refine_strand *strand, struct refine_space *space, uint32_t n_steps, double tolerance,
+                  double *worst)
 {
-    double sum = measure(strand, worst), damping = 1e-3, left;
+    double sum = measure(strand, space, space->junction, 0, worst), damping = 1e-3, left;
     uint32_t failures = 0;
     int smooth = 1; /* no failure yet: the model can be believed */
     for (uint32_t step = 0; step < n_steps && *worst > tolerance && failures < 4; step++) {
@@ -367,15 +411,16 @@ double REFINE_FIT(struct refine_strand *strand, const struct refine_space *space
         if (try_step(strand, space, damping, &sum, worst, &left)) {
             damping = fmax(damping * 0.1, 1e-9);
             failures = 0;
-            if ((smooth && left < 0.05 * sum && *worst < 2.0 * tolerance) || sum > 0.9 * before)
+            if ((smooth && left < CONVERGED * sum) || sum > 0.9 * before)
                 break; /* as near as these elements come */
         } else {
             damping *= 10.0;
             failures++;
             smooth = 0;
+            measure(strand, space, space->junction, 1, worst);
         }
     }
-    return failures ? measure(strand, worst) : sum; /* `fitted` belongs to what was kept */
+    return sum;
 }
 
 #endif

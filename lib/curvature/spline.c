@@ -1,6 +1,8 @@
 #include "curvature/spline.h"
 
-#include <math.h>
+#include <string.h>
+
+#include "curvature/spline_rows.h"
 
 /* --- slopes -------------------------------------------------------------------- */
 
@@ -57,38 +59,35 @@ static void solve_many(struct spline *s)
 
 /* --- arc length ------------------------------------------------------------------ */
 
-/* The derivative in segment i at u in 0..1, as a quadratic of u. */
-struct speed {
-    vec3 a, b, c; /* a + b u + c u^2 */
-};
-
-static struct speed speed_of(const struct spline *s, uint32_t i)
+/* The derivative in each segment at u in 0..1, as a quadratic of u; zeros beyond the last. */
+static void fill_rates(struct spline *s)
 {
-    vec3 m = chord_slope(s, i), s0 = s->slope[i], s1 = s->slope[i + 1];
-    vec3 sum = vec_sub(vec_add(s0, s1), vec_scale(2.0, m));
-    return (struct speed){s0, vec_scale(2.0, vec_sub(vec_sub(m, s0), sum)), vec_scale(3.0, sum)};
-}
-
-static vec3 speed_at(const struct speed *q, double u)
-{
-    return vec_add(q->a, vec_scale(u, vec_add(q->b, vec_scale(u, q->c))));
-}
-
-/* Gauss-Legendre, five points on 0..1 */
-static const double gauss_at[5] = {0.046910077030668004, 0.230765344947158450, 0.5, 0.769234655052841550,
-                                   0.953089922969331996};
-static const double gauss_weight[5] = {0.118463442528094544, 0.239314335249683234, 0.284444444444444444,
-                                       0.239314335249683234, 0.118463442528094544};
-
-/* Arc length of segment i from 0 to u. */
-static double segment_arc(const struct speed *q, double h, double u)
-{
-    double sum = 0.0;
-    for (int k = 0; k < 5; k++) {
-        vec3 d = speed_at(q, u * gauss_at[k]);
-        sum += gauss_weight[k] * sqrt(vec_dot(d, d));
+    uint32_t stride = s->n + 3;
+    double *rate = s->rate;
+    for (uint32_t i = 0; i + 1 < s->n; i++) {
+        vec3 m = chord_slope(s, i), s0 = s->slope[i], s1 = s->slope[i + 1];
+        vec3 c = vec_sub(vec_add(s0, s1), vec_scale(2.0, m));
+        vec3 of[3] = {s0, vec_scale(2.0, vec_sub(vec_sub(m, s0), c)), vec_scale(3.0, c)};
+        for (uint32_t k = 0; k < 3; k++) {
+            rate[(3 * k) * stride + i] = of[k].x;
+            rate[(3 * k + 1) * stride + i] = of[k].y;
+            rate[(3 * k + 2) * stride + i] = of[k].z;
+        }
     }
-    return h * u * sum;
+    for (uint32_t k = 0; k < 9; k++)
+        memset(rate + k * stride + s->n - 1, 0, 4 * sizeof *rate);
+    memset(s->h + s->n - 1, 0, 4 * sizeof *s->h);
+}
+
+static void fill_arcs(struct spline *s)
+{
+#if defined(__x86_64__) && defined(__GNUC__)
+    if (__builtin_cpu_supports("avx2")) {
+        spline_arcs_avx2(s->n, s->rate, s->h, s->arc);
+        return;
+    }
+#endif
+    spline_arcs_generic(s->n, s->rate, s->h, s->arc);
 }
 
 void spline_solve(struct spline *s)
@@ -99,48 +98,21 @@ void spline_solve(struct spline *s)
         solve_three(s);
     else
         solve_many(s);
-    s->arc[0] = 0.0;
-    for (uint32_t i = 0; i + 1 < s->n; i++) {
-        struct speed q = speed_of(s, i);
-        s->arc[i + 1] = s->arc[i] + segment_arc(&q, s->h[i], 1.0);
-    }
+    fill_rates(s);
+    fill_arcs(s);
 }
 
-/* --- evaluation ------------------------------------------------------------------- */
+/* --- evaluation ------------------------------------ */
 
-/* u in 0..1 where a segment has gone `want` of its `whole` metres: Newton, kept inside, from where it
- * would be if the speed changed linearly. */
-static double invert_arc(const struct speed *q, double h, double want, double whole)
+void spline_at(const struct spline *s, const double *arc, uint32_t n, vec3 *point, vec3 *tangent)
 {
-    vec3 end = speed_at(q, 1.0);
-    double s0 = sqrt(vec_dot(q->a, q->a)), s1 = sqrt(vec_dot(end, end)), share = want / whole;
-    double u = share * (s0 + s1) / (s0 + sqrt(s0 * s0 + share * (s1 * s1 - s0 * s0)));
-    if (!(u >= 0.0 && u <= 1.0))
-        u = share;
-    for (int iteration = 0; iteration < 12; iteration++) {
-        vec3 d = speed_at(q, u);
-        double slope = h * sqrt(vec_dot(d, d)), miss = segment_arc(q, h, u) - want;
-        if (!(slope > 1e-3 * whole))
-            break;
-        u = fmin(fmax(u - miss / slope, 0.0), 1.0);
-        if (fabs(miss) <= 1e-8 * whole) /* quadratic: what is left is below 1e-15 */
-            break;
+    const struct spline_curve curve = {s->n, s->rate, s->h, s->arc, (const double (*)[3])s->point};
+    double (*p)[3] = (double (*)[3])point, (*t)[3] = (double (*)[3])tangent;
+#if defined(__x86_64__) && defined(__GNUC__)
+    if (__builtin_cpu_supports("avx2")) {
+        spline_stations_avx2(&curve, arc, n, p, t);
+        return;
     }
-    return u;
-}
-
-void spline_at(const struct spline *s, double arc, uint32_t *segment, vec3 *point, vec3 *tangent)
-{
-    uint32_t i = *segment;
-    while (i + 2 < s->n && arc >= s->arc[i + 1])
-        i++;
-    *segment = i;
-    struct speed q = speed_of(s, i);
-    double whole = s->arc[i + 1] - s->arc[i], want = fmin(fmax(arc - s->arc[i], 0.0), whole);
-    double u = want >= whole ? 1.0 : invert_arc(&q, s->h[i], want, whole);
-    vec3 d = speed_at(&q, u);
-    double norm = sqrt(vec_dot(d, d));
-    vec3 way = vec_add(q.a, vec_scale(u, vec_add(vec_scale(1.0 / 2, q.b), vec_scale(u / 3, q.c))));
-    *point = vec_add(s->point[i], vec_scale(u * s->h[i], way));
-    *tangent = norm > 1e-9 ? vec_scale(1.0 / norm, d) : chord_slope(s, i);
+#endif
+    spline_stations_generic(&curve, arc, n, p, t);
 }

@@ -19,6 +19,8 @@ static const struct real_file files[] = {
     {"harolongo/hair.data", 0.01, GROOM_UP_Y}, {"sintel/hair.tfx", 1.0, GROOM_UP_Y},
     {"combover/hair.data", 1.0, GROOM_UP_Z},   {"mohawk/hair.tfx", 1.0, GROOM_UP_Y},
     {"bangs100/Bangs_100.data", 0.001, GROOM_UP_Z},
+    {"guides/back.data", 1.0, GROOM_UP_Y},     {"guides/slicked_back.data", 1.0, GROOM_UP_Y},
+    {"guides/scene_hair.data", 1.0, GROOM_UP_Y}, /* with strands that fold back on themselves */
 };
 
 static struct groom_strands *read_strands(const struct real_file *file)
