@@ -3,6 +3,7 @@
 #   make            groomd, groom-worker, groomctl and libgroom in build/
 #   make run        a daemon that has fitted the bundled sample, and the address to open
 #   make test       lint, unit, property, fuzz corpus, API and end-to-end tests
+#   make test-service  each write, sync, rename, allocation below the storage fails in turn
 #   make test-cluster  fits on a Slurm cluster of two nodes on loopback (installs slurm-wlm and munge)
 #   make test-deploy   the Debian package, the systemd unit, nginx in front (installs nginx)
 #   make deb        build/groomd_VERSION_ARCH.deb
@@ -62,7 +63,7 @@ PROGRAM_OF_server_groomd.c = groomd
 PROGRAM_OF_server_worker_main.c = groom-worker
 PROGRAM_OF_client_groomctl_main.c = groomctl
 
-.PHONY: all setup programs lib run test unit check-all test-cluster test-deploy deb bench real-captures asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
+.PHONY: all setup programs lib run test unit check-all test-service test-cluster test-deploy deb bench real-captures asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
 .DEFAULT_GOAL := all
 
 all: setup
@@ -136,7 +137,14 @@ $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(call objects,$(SUPPORT_SOURCES)) $(PA
 	$(CC) $(CFLAGS_ALL) -o $@ $< $(call objects,$(SUPPORT_SOURCES)) $(PARTS_A) $(PROTO_A) $(LIBGROOM) $(LDFLAGS) \
 	    $(LIBS_SERVER) $(LIBS_LIB) -lcheck -lsubunit -lrt -lm
 
-tests: $(UNIT_TESTS)
+# Preloaded into groomd by tests/faults.
+FAULT_LIBRARY = $(BUILD)/tests/libfault.so
+$(FAULT_LIBRARY): tests/faults/libfault.c
+	@mkdir -p $(@D)
+	$(CC) -std=c11 -D_GNU_SOURCE -fPIC -shared -O1 -g $(WARNINGS) $(if $(filter-out release,$(VARIANT)),-DWITHOUT_ALLOCATOR) \
+	    -o $@ $< -ldl
+
+tests: $(UNIT_TESTS) $(FAULT_LIBRARY)
 
 test: setup
 	+@$(SUBMAKE) check-all
@@ -150,6 +158,11 @@ unit: programs tests
 
 api e2e: programs node-packages
 	@BUILD=$(BUILD) tests/run.sh $@
+
+# What a service must withstand, in full; `make test` has a short form of it.
+test-service: setup
+	+@$(SUBMAKE) programs node-packages $(FAULT_LIBRARY)
+	@FAULTS=all BUILD=$(BUILD) tests/run.sh faults
 
 # Not part of `make test`: it installs what most machines do not have.
 test-cluster: setup

@@ -163,3 +163,30 @@ cJSON *json_text_parse(const char *bytes, size_t n_bytes, struct json_text_error
     cJSON_Delete(tree);
     return NULL;
 }
+
+/* --- memory that was out ------------------------------------------------------------------ */
+
+static _Thread_local struct {
+    bool watched, failed;
+} memory;
+
+static void *watched_malloc(size_t n)
+{
+    void *bytes = malloc(n);
+    memory.failed |= !bytes && memory.watched;
+    return bytes;
+}
+
+void json_memory_install(void)
+{
+    cJSON_Hooks hooks = {watched_malloc, free};
+    cJSON_InitHooks(&hooks);
+}
+
+void json_memory_begin(void)
+{
+    memory.watched = true;
+    memory.failed = false;
+}
+
+bool json_memory_failed(void) { return memory.failed; }

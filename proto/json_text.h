@@ -7,6 +7,7 @@
 #ifndef PROTO_JSON_TEXT_H
 #define PROTO_JSON_TEXT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -23,5 +24,12 @@ struct json_text_error {
 /* bytes need no terminator. The tree is the caller's to delete.
  * returns  NULL on failure; error, which may be NULL, says why */
 struct cJSON *json_text_parse(const char *bytes, size_t n_bytes, struct json_text_error *error);
+
+/* cJSON leaves out what it has no memory for and says nothing. From json_memory_install on (once, before any
+ * thread starts) a thread can ask whether that has happened since it called json_memory_begin; a thread that
+ * never did is told no. */
+void json_memory_install(void);
+void json_memory_begin(void);
+bool json_memory_failed(void);
 
 #endif

@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 #include "proto/work.h"
+#include "proto/json_text.h"
 #include "server/blobs/blobs.h"
 #include "server/config.h"
 #include "server/grooms/grooms.h"
@@ -373,6 +374,7 @@ int main(int argc, char **argv)
         return 2;
     }
     log_set_level((enum config_log_level)daemon.config.log_level);
+    json_memory_install();
     raise_descriptor_limit();
     block_signals(&signals);
     if ((status = start(&daemon, &diag)) == GROOM_OK)

@@ -5,7 +5,7 @@ set -uo pipefail
 cd "$(dirname "$0")/.."
 BUILD=${BUILD:-build}
 export BUILD
-kinds=("$@"); [ ${#kinds[@]} -gt 0 ] || kinds=(unit api e2e)
+kinds=("$@"); [ ${#kinds[@]} -gt 0 ] || kinds=(unit api e2e faults)
 mkdir -p "$BUILD/tests"
 log=$BUILD/tests/last.log; : >"$log"
 failed_programs=()
@@ -39,7 +39,7 @@ run_node() { # folder
 for kind in "${kinds[@]}"; do
     case $kind in
         unit) run_unit ;;
-        api|e2e|cluster|deploy) run_node "$kind" ;;
+        api|e2e|faults|cluster|deploy) run_node "$kind" ;;
         *) echo "tests/run.sh: unit, api, e2e, cluster or deploy, not $kind" >&2; exit 2 ;;
     esac
 done

@@ -216,6 +216,10 @@ void respond_json(struct request *request, int status, cJSON *json)
 {
     char *text = json ? cJSON_PrintUnformatted(json) : NULL;
     cJSON_Delete(json);
+    if (text && json_memory_failed()) { /* a member is missing */
+        free(text);
+        text = NULL;
+    }
     if (text)
         respond_bytes(request, status, "application/json", text, strlen(text));
     else

@@ -21,6 +21,7 @@
 
 #include <openssl/evp.h>
 
+#include "proto/json_text.h"
 #include "server/jobs/work.h"
 #include "server/log.h"
 #include "server/uploads/uploads.h"
@@ -422,6 +423,7 @@ static void run_handler(struct task *task)
 {
     struct request *request = (struct request *)task;
     bool resumes = request->route->flags & ROUTE_RESUMES;
+    json_memory_begin();
     request->route->handle(request); /* where it resumes, the request may be gone by now */
     if (!resumes)
         request_resume(request);

@@ -19,36 +19,46 @@ struct process {
     char boot[16];
 };
 
+/* The beginning of a small file of /proc, without a stream: where memory or descriptors are out, a worker
+ * that lives must not look dead. returns  0, ENOENT or ESRCH (it is not there), another errno */
+static int read_proc(const char *path, char *text, size_t size)
+{
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0)
+        return errno;
+    ssize_t n = read(fd, text, size - 1);
+    int error = n < 0 ? errno : 0;
+    text[n > 0 ? n : 0] = 0;
+    close(fd);
+    return error;
+}
+
 /* The number of this boot, shortened; "" where it cannot be read. */
 static void read_boot(char boot[16])
 {
-    FILE *file = fopen("/proc/sys/kernel/random/boot_id", "re");
+    char text[64];
     boot[0] = 0;
-    if (!file)
-        return;
-    if (fscanf(file, "%8[0-9a-f]", boot) != 1)
+    if (read_proc("/proc/sys/kernel/random/boot_id", text, sizeof text) != 0 || sscanf(text, "%8[0-9a-f]", boot) != 1)
         boot[0] = 0;
-    fclose(file);
 }
 
-/* Fields 3 and 22 of /proc/PID/stat; the second is a name in parentheses that may hold anything.
- * returns  false where there is no such process */
-static bool read_stat(pid_t pid, char *state, unsigned long long *start)
+enum presence { THERE, GONE, UNKNOWN };
+
+/* Fields 3 and 22 of /proc/PID/stat; the second is a name in parentheses that may hold anything. */
+static enum presence read_stat(pid_t pid, char *state, unsigned long long *start)
 {
     char path[64], line[1024];
     snprintf(path, sizeof path, "/proc/%ld/stat", (long)pid);
-    FILE *file = fopen(path, "re");
-    if (!file)
-        return false;
-    char *got = fgets(line, sizeof line, file);
-    fclose(file);
-    char *at = got ? strrchr(line, ')') : NULL;
+    int error = read_proc(path, line, sizeof line);
+    if (error)
+        return error == ENOENT || error == ESRCH ? GONE : UNKNOWN;
+    char *at = strrchr(line, ')');
     if (!at || at[1] != ' ')
-        return false;
+        return UNKNOWN;
     *state = at[2];
     for (int field = 2; at && field < 22; field++)
         at = strchr(at + 1, ' ');
-    return at && sscanf(at, "%llu", start) == 1;
+    return at && sscanf(at, "%llu", start) == 1 ? THERE : UNKNOWN;
 }
 
 static void write_handle(const struct process *process, char handle[LAUNCH_HANDLE_SIZE])
@@ -68,12 +78,22 @@ static bool read_handle(const char *handle, struct process *process)
 
 /* Is it still this very process, and not another that got its number? *state is 'Z' for one that has
  * ended and was not waited for. */
-static bool is_there(const struct process *process, char *state)
+static enum presence look(const struct process *process, char *state)
 {
     unsigned long long start;
     char boot[16];
     read_boot(boot);
-    return strcmp(boot, process->boot) == 0 && read_stat(process->pid, state, &start) && start == process->start;
+    if (!boot[0] && process->boot[0])
+        return UNKNOWN;
+    if (strcmp(boot, process->boot) != 0)
+        return GONE;
+    enum presence presence = read_stat(process->pid, state, &start);
+    return presence == THERE && start != process->start ? GONE : presence;
+}
+
+static groom_status not_known(const char *handle, struct groom_diag *diag)
+{
+    return groom_fail(diag, GROOM_EIO, "%s cannot be looked after: %s", handle, strerror(errno));
 }
 
 /* --- the table --------------------------------------------------------------------------------- */
@@ -99,7 +119,7 @@ static groom_status local_start(struct launcher *launcher, const struct launch_s
         close(log_fd);
     if (status != GROOM_OK)
         return status;
-    if (!read_stat(process.pid, &state, &process.start))
+    if (read_stat(process.pid, &state, &process.start) != THERE)
         process.start = 0; /* without /proc: it is still our child, and waited for */
     read_boot(process.boot);
     write_handle(&process, handle);
@@ -118,7 +138,11 @@ static groom_status local_poll(struct launcher *launcher, const char *handle, st
     char state = 'Z';
     int how;
     *status = (struct launch_status){.state = LAUNCH_RUNNING};
-    if (!read_handle(handle, &process) || (process.start != 0 && !is_there(&process, &state))) {
+    bool known = read_handle(handle, &process);
+    enum presence presence = known && process.start != 0 ? look(&process, &state) : THERE;
+    if (presence == UNKNOWN)
+        return not_known(handle, diag);
+    if (!known || presence == GONE) {
         say_gone(status);
         return GROOM_OK;
     }
@@ -144,8 +168,11 @@ static groom_status local_stop(struct launcher *launcher, const char *handle, en
     struct process process;
     int number = how == LAUNCH_KILL ? SIGKILL : SIGTERM;
     char state;
-    if (!read_handle(handle, &process) || (process.start != 0 && !is_there(&process, &state)))
+    if (!read_handle(handle, &process))
         return GROOM_OK;
+    enum presence presence = process.start != 0 ? look(&process, &state) : THERE;
+    if (presence != THERE)
+        return presence == GONE ? GROOM_OK : not_known(handle, diag);
     if (is_our_child(process.pid)) { /* not waited for yet: the number is its own, and its group's */
         if (kill(-process.pid, number) != 0 && errno != ESRCH)
             return groom_fail(diag, GROOM_EIO, "stopping %s: %s", handle, strerror(errno));
@@ -156,7 +183,7 @@ static groom_status local_stop(struct launcher *launcher, const char *handle, en
     if (pid_fd < 0)
         return GROOM_OK;
     groom_status status = GROOM_OK;
-    if (is_there(&process, &state) && syscall(SYS_pidfd_send_signal, pid_fd, number, NULL, 0) != 0 && errno != ESRCH)
+    if (look(&process, &state) == THERE && syscall(SYS_pidfd_send_signal, pid_fd, number, NULL, 0) != 0 && errno != ESRCH)
         status = groom_fail(diag, GROOM_EIO, "stopping %s: %s", handle, strerror(errno));
     close(pid_fd);
     return status;

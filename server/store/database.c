@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "proto/json_text.h"
+
 groom_status database_fail(sqlite3 *db, int code, struct groom_diag *diag)
 {
     groom_status status;
@@ -45,6 +47,8 @@ groom_status transaction_begin(struct store *store, struct connection **c, struc
 
 groom_status transaction_end(struct connection *c, groom_status status, struct groom_diag *diag)
 {
+    if (status == GROOM_OK && json_memory_failed()) /* what is being written may lack a member */
+        status = groom_fail(diag, GROOM_ENOMEM, "no memory for what was to be written");
     if (status == GROOM_OK)
         status = database_execute(c->db, "COMMIT", diag);
     /* some failures (a full disk) have rolled back already */
