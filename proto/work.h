@@ -11,7 +11,8 @@
  *   PUT  /v1/work/checkpoint?stage=N   2xx; body application/octet-stream, N stages are done.
  *                                      Acknowledged = durable
  *   POST /v1/work/progress             200 {"cancel":bool}; body: the progress message (below)
- *   POST /v1/work/result               2xx; body: the groom document. Ends the attempt
+ *   POST /v1/work/result               2xx; body: the groom document, with a member "quality" where there is
+ *                                      a report (groom/quality.h). Ends the attempt
  *   POST /v1/work/failed               2xx; body: a problem (proto/problem.h). Ends the attempt
  *   POST /v1/work/ended                2xx; body: {"words":"..."}: the process ends without either, and
  *                                      why; for launchers that learn late, or never, how it ended

@@ -78,6 +78,20 @@ static groom_status write_groom(struct grooms *grooms, const struct groom *groom
     return status;
 }
 
+/* The groom with random numbers as they were before a fit, or an edit, moved them. */
+static groom_status draw_randoms(struct grooms *grooms, const struct groom *groom, struct groom **drawn,
+                                 struct groom_diag *diag)
+{
+    struct groom *copy = NULL;
+    groom_status status = groom_clone(groom, &grooms->context, &copy, diag);
+    if (status != GROOM_OK)
+        return status;
+    for (uint32_t o = 0; o < copy->n_operators; o++)
+        groom_draw_random(copy, &copy->operators[o], copy->operators[o].seed);
+    *drawn = copy;
+    return GROOM_OK;
+}
+
 groom_status grooms_write_strands(struct grooms *grooms, const char *groom_id, const struct grooms_export *what,
                                   struct groom_sink sink, struct groom_diag *diag)
 {
@@ -87,7 +101,9 @@ groom_status grooms_write_strands(struct grooms *grooms, const char *groom_id, c
     groom_status status = models_acquire(grooms, groom_id, what->revision, &model, diag);
     if (status != GROOM_OK)
         return status;
-    if (what->count > model->groom->n_strands)
+    if (what->drawn)
+        status = draw_randoms(grooms, model->groom, &fewer, diag);
+    else if (what->count > model->groom->n_strands)
         status = groom_fail_field(diag, GROOM_EINVAL, "/count", "the groom has %u strands: ask for at most as many",
                                   model->groom->n_strands);
     if (status == GROOM_OK)

@@ -13,6 +13,7 @@ groom_status grooms_create(const struct grooms_options *options, struct grooms *
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the groom service");
     grooms->options = *options;
     grooms->context.pool = options->pool;
+    pthread_mutex_init(&grooms->comparing, NULL);
     size_t max_bytes = options->max_cache_bytes ? options->max_cache_bytes : DEFAULT_CACHE_BYTES;
     if (models_create(max_bytes, &grooms->models) != GROOM_OK || states_create(2 * max_bytes, &grooms->states) != GROOM_OK ||
         heads_create(&grooms->heads) != GROOM_OK) {
@@ -30,13 +31,14 @@ void grooms_destroy(struct grooms *grooms)
     models_destroy(grooms->models);
     states_destroy(grooms->states);
     heads_destroy(grooms->heads);
+    pthread_mutex_destroy(&grooms->comparing);
     free(grooms);
 }
 
 /* --- first revisions ---------------------------------------------------------------------- */
 
 struct grooms_kept {
-    char *document, *name;
+    char *document, *name, *target, *quality;
     struct store_array *list;
     struct arrays arrays;
 };
@@ -56,16 +58,30 @@ static groom_status set_source(cJSON *around, const struct grooms_source *source
     return status;
 }
 
+/* A fit's document brings its quality report along; nobody else's word on it counts. */
+static groom_status take_quality(cJSON *tree, const struct grooms_source *source, struct grooms_kept *kept)
+{
+    cJSON *quality = cJSON_DetachItemFromObjectCaseSensitive(tree, "quality");
+    groom_status status = GROOM_OK;
+    if (source && source->strands && cJSON_IsObject(quality) &&
+        (!(kept->quality = cJSON_PrintUnformatted(quality)) || !(kept->target = strdup(source->strands))))
+        status = GROOM_ENOMEM;
+    cJSON_Delete(quality);
+    return status;
+}
+
 /* The members around the model: what the document had, with its new identity. */
 static groom_status make_around(const char *document, size_t n_bytes, const char *groom_id,
-                                const struct grooms_source *source, char **around, struct groom_diag *diag)
+                                const struct grooms_source *source, struct grooms_kept *kept, char **around,
+                                struct groom_diag *diag)
 {
     cJSON *tree;
     groom_status status = documents_parse(document, n_bytes, &tree, diag);
     if (status != GROOM_OK)
         return status;
     documents_strip_model(tree);
-    if ((status = documents_set_string(tree, "id", groom_id)) == GROOM_OK &&
+    if ((status = take_quality(tree, source, kept)) == GROOM_OK &&
+        (status = documents_set_string(tree, "id", groom_id)) == GROOM_OK &&
         (status = documents_set_number(tree, "revision", 1)) == GROOM_OK)
         status = documents_set_string(tree, "parent", NULL);
     if (status == GROOM_OK && source)
@@ -99,7 +115,7 @@ groom_status prepare_groom(struct grooms *grooms, const struct groom *groom, con
     arrays_init(&prepared.kept->arrays, grooms->options.store);
 
     if ((status = store_make_id("grm_", prepared.groom_id)) != GROOM_OK ||
-        (status = make_around(document, n_bytes, prepared.groom_id, source, &around, diag)) != GROOM_OK ||
+        (status = make_around(document, n_bytes, prepared.groom_id, source, prepared.kept, &around, diag)) != GROOM_OK ||
         (status = write_kept(groom, around, prepared.kept, diag)) != GROOM_OK ||
         (status = arrays_list(&prepared.kept->arrays, &prepared.kept->list, &prepared.revision.n_arrays)) != GROOM_OK)
         goto out;
@@ -109,6 +125,8 @@ groom_status prepare_groom(struct grooms *grooms, const struct groom *groom, con
     out->revision.name = out->kept->name;
     out->revision.document = out->kept->document;
     out->revision.arrays = out->kept->list;
+    out->revision.compared_with = out->kept->target;
+    out->revision.quality = out->kept->quality;
     prepared.kept = NULL;
 out:
     grooms_prepared_finish(&prepared);
@@ -135,6 +153,8 @@ void grooms_prepared_finish(struct grooms_prepared *prepared)
         free(prepared->kept->list);
         free(prepared->kept->document);
         free(prepared->kept->name);
+        free(prepared->kept->target);
+        free(prepared->kept->quality);
         free(prepared->kept);
     }
     *prepared = (struct grooms_prepared){0};

@@ -139,6 +139,7 @@ struct grooms_export {
     struct groom_write_options write;
     uint32_t count;    /* of strands: a fair sample of them, the same for every revision, and each
                         * smaller one part of the larger ones. 0: all */
+    bool drawn;        /* all strands, with every random number drawn from its operator's seed */
 };
 
 /* Strands 0..n-1 of a revision, evaluated piece by piece into the sink. */
@@ -164,6 +165,28 @@ void grooms_dense_finish(struct grooms_dense *dense); /* takes zeroed */
 
 /* The pool that evaluation takes turns in, for those who compute with strands. */
 const struct groom_context *grooms_context(const struct grooms *grooms);
+
+/* What is compared with what. */
+struct grooms_comparison {
+    const char *id;    /* "grm_…", or "str_…" with a target */
+    uint32_t revision; /* of a groom; 0: the latest */
+    const char *with;  /* the target, "str_…" or "grm_…" (its latest revision); NULL: the strands it was fitted to */
+};
+
+/* How alike they are (groom/quality.h): {"id","revision","target","target_revision", and the report}. A
+ * report that is not in the store yet is made by `groom-worker compare`, and kept; that takes seconds.
+ * returns  also GROOM_ENOTFOUND where the groom was not fitted to strands that are here, and what the
+ *          comparison answers (GROOM_EEMPTY: too few strands) */
+GROOM_MUST_CHECK groom_status grooms_quality(struct grooms *grooms, const struct grooms_comparison *what, char **json,
+                                             size_t *n_bytes, struct groom_diag *diag);
+
+enum grooms_picture { GROOMS_PICTURE_TARGET, GROOMS_PICTURE_GROOM, GROOMS_PICTURE_DRAWN };
+
+/* The target, the groom, or the groom with drawn random numbers, all with the camera that the target's
+ * picture has, as PNG bytes (malloc'ed). */
+GROOM_MUST_CHECK groom_status grooms_quality_picture(struct grooms *grooms, const struct grooms_comparison *what,
+                                                     enum grooms_picture of, groom_view view, uint32_t size, char **png,
+                                                     size_t *n_bytes, struct groom_diag *diag);
 
 /* A shaded picture of the dense strands on the head that the groom was fitted with, as PNG bytes
  * (malloc'ed). */

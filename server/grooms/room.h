@@ -18,6 +18,7 @@ struct grooms {
     struct models *models;
     struct states *states;
     struct heads *heads;
+    pthread_mutex_t comparing;    /* one comparison at a time: each uses all processors */
 };
 
 /* --- the arrays of one document (arrays.c) --------------------------------------------- */

@@ -62,6 +62,12 @@ void work_call_result(struct request *request);
 void work_call_failed(struct request *request);
 void work_call_ended(struct request *request);
 
+/* quality_calls.c, report_page.c */
+void quality_call_groom(struct request *request);
+void quality_call_strands(struct request *request);
+void quality_call_picture(struct request *request);
+void page_quality(struct request *request);
+
 /* groom_calls.c */
 void grooms_call_delete(struct request *request);
 void grooms_call_list(struct request *request);

@@ -7,35 +7,12 @@
 #include "proto/embed.h"
 #include "proto/json_text.h"
 #include "server/http/handlers.h"
+#include "server/http/html.h"
 #include "server/jobs/jobs.h"
 
 EMBED(status_css, "server/http/status.css");
 
 #define N_SHOWN 24
-
-static void put_escaped(FILE *out, const char *text)
-{
-    for (; *text; text++)
-        switch (*text) {
-        case '<':
-            fputs("&lt;", out);
-            break;
-        case '>':
-            fputs("&gt;", out);
-            break;
-        case '&':
-            fputs("&amp;", out);
-            break;
-        case '"':
-            fputs("&quot;", out);
-            break;
-        case '\'':
-            fputs("&#39;", out);
-            break;
-        default:
-            fputc(*text, out);
-        }
-}
 
 static void put_groom(FILE *out, const struct store_groom *groom)
 {
@@ -46,14 +23,15 @@ static void put_groom(FILE *out, const struct store_groom *groom)
             "height=\"192\" alt=\"\" "
             "src=\"/v1/grooms/%s/preview.png?size=192&amp;revision=%u\"></a><figcaption><b>",
             groom->id, groom->id, groom->latest);
-    put_escaped(out, groom->name && groom->name[0] ? groom->name : groom->id);
+    html_escape(out, groom->name && groom->name[0] ? groom->name : groom->id);
     fprintf(out, "</b><br><code>%s</code><br>revision %u, <time>%s</time><br>", groom->id, groom->latest,
             changed);
     static const char *const formats[] = {"hair", "usda", "ply", "obj"};
     for (size_t i = 0; i < sizeof formats / sizeof formats[0]; i++)
         fprintf(out, "<a href=\"/v1/grooms/%s/strands?format=%s\">%s</a> ", groom->id, formats[i],
                 formats[i]);
-    fprintf(out, "<a href=\"/v1/grooms/%s?arrays=false\">document</a></figcaption></figure>\n", groom->id);
+    fprintf(out, "<a href=\"/v1/grooms/%s?arrays=false\">document</a> <a href=\"/grooms/%s/quality\">quality</a>"
+                 "</figcaption></figure>\n", groom->id, groom->id);
 }
 
 static void put_grooms(FILE *out, struct store *store)
@@ -76,7 +54,7 @@ static void put_result(FILE *out, const struct store_job *job)
     cJSON *error = job->error ? json_text_parse(job->error, strlen(job->error), NULL) : NULL;
     const char *groom = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(result, "groom"));
     const char *detail = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(error, "detail"));
-    put_escaped(out, groom ? groom : detail ? detail : "");
+    html_escape(out, groom ? groom : detail ? detail : "");
     cJSON_Delete(result);
     cJSON_Delete(error);
 }
@@ -88,7 +66,7 @@ static void put_job(FILE *out, const struct store_job *job)
     store_time_text(job->created_ms, created);
     fprintf(out, "<tr class=\"%s\"><td><a href=\"/v1/jobs/%s\"><code>%s</code></a></td><td>%s</td><td>",
             state, job->id, job->id, state);
-    put_escaped(out, job->stage ? job->stage : "");
+    html_escape(out, job->stage ? job->stage : "");
     fprintf(out, "</td><td><progress max=\"1\" value=\"%.3f\"></progress></td><td><time>%s</time></td><td>",
             job->progress, created);
     put_result(out, job);
@@ -129,16 +107,7 @@ void page_index(struct request *request)
     put_grooms(out, request->service->store);
     put_jobs(out, request->service->jobs);
     fputs("</body></html>\n", out);
-    if (fclose(out)) {
-        free(text);
-        respond_failure(request, GROOM_ENOMEM, NULL);
-        return;
-    }
-    respond_bytes(request, 200, "text/html; charset=utf-8", text, size);
-    respond_header(request, "Content-Security-Policy",
-                   "default-src 'none'; img-src 'self'; style-src 'self'; base-uri 'none'; form-action "
-                   "'none'; frame-ancestors 'none'");
-    respond_header(request, "Referrer-Policy", "no-referrer");
+    html_respond(request, out, &text, &size);
 }
 
 void page_style(struct request *request)

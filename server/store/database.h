@@ -122,6 +122,8 @@ void database_close_copy(struct store *store);
 
 groom_status groom_insert(struct connection *c, const struct store_revision_new *revision, int64_t now,
                           struct groom_diag *diag);
+groom_status quality_insert(struct connection *c, const struct store_quality *key, const char *report, int64_t now,
+                            struct groom_diag *diag);
 groom_status event_append(struct connection *c, const char *job_id, const char *type, const char *data,
                           int64_t now, struct groom_diag *diag);
 /* The limit of a page, one more than asked for, so that a next page shows itself. */

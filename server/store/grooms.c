@@ -72,7 +72,13 @@ groom_status groom_insert(struct connection *c, const struct store_revision_new 
     groom_status status = query_run(&q, &n_changed);
     if (status == GROOM_OK && n_changed == 0)
         status = groom_fail(diag, GROOM_ECONFLICT, "there is a groom %.40s already", revision->groom_id);
-    return status == GROOM_OK ? insert_revision(c, revision, 1, now, diag) : status;
+    if (status == GROOM_OK)
+        status = insert_revision(c, revision, 1, now, diag);
+    if (status == GROOM_OK && revision->quality) {
+        struct store_quality key = {revision->groom_id, 1, revision->compared_with};
+        status = quality_insert(c, &key, revision->quality, now, diag);
+    }
+    return status;
 }
 
 groom_status store_groom_create(struct store *store, const struct store_revision_new *revision,

@@ -84,6 +84,8 @@ static groom_status delete_groom(struct connection *c, const char *id, struct gr
     if (status == GROOM_OK)
         status = run_for(c, "DELETE FROM revision_arrays WHERE groom_id = ?1", id, NULL, diag);
     if (status == GROOM_OK)
+        status = run_for(c, "DELETE FROM qualities WHERE subject = ?1", id, NULL, diag);
+    if (status == GROOM_OK)
         status = run_for(c, "DELETE FROM revisions WHERE groom_id = ?1", id, NULL, diag);
     if (status == GROOM_OK)
         status = run_for(c, "DELETE FROM grooms WHERE id = ?1", id, &n_changed, diag);

@@ -85,7 +85,13 @@ static const char version_4[] =
 static const char version_5[] =
     "CREATE TABLE heartbeat (one INTEGER PRIMARY KEY CHECK (one = 1), at INTEGER NOT NULL) STRICT;";
 
-const char *const schema_steps[] = {version_1, version_2, version_3, version_4, version_5};
+/* quality reports: of a revision (or of strands: 0), compared with strands or with "<groom>/<revision>" */
+static const char version_6[] =
+    "CREATE TABLE qualities ("
+    "  subject TEXT NOT NULL, number INTEGER NOT NULL, target TEXT NOT NULL, report TEXT NOT NULL,"
+    "  created INTEGER NOT NULL, PRIMARY KEY (subject, number, target)) STRICT, WITHOUT ROWID;";
+
+const char *const schema_steps[] = {version_1, version_2, version_3, version_4, version_5, version_6};
 const int schema_version = sizeof schema_steps / sizeof schema_steps[0];
 
 static groom_status read_version(sqlite3 *db, int *version, struct groom_diag *diag)

@@ -149,6 +149,7 @@ struct store_revision_new {
     const char *note;                 /* what made it: "fit", "import", "patch"; NULL: "" */
     const struct store_array *arrays; /* every array that the document refers to */
     size_t n_arrays;
+    const char *compared_with, *quality; /* its quality report (JSON) against these strands; or NULL */
 };
 
 struct store_revision {
@@ -206,6 +207,22 @@ GROOM_MUST_CHECK groom_status store_groom_remove(struct store *store, const char
 void store_revision_finish(struct store_revision *revision);
 void store_revision_list_finish(struct store_revision_list *list);
 void store_groom_list_finish(struct store_groom_list *list);
+
+/* --- quality reports --------------------------------------------------------------------------- */
+
+/* How alike a revision of a groom (or uploaded strands: number 0) is to a target, which is the id of strands
+ * or "grm_…/<revision>". Nothing that is compared ever changes, so neither does a report. */
+struct store_quality {
+    const char *subject;
+    uint32_t number;
+    const char *target;
+};
+/* *report is malloc'ed, JSON as groom/quality.h prints it. returns  GROOM_ENOTFOUND */
+GROOM_MUST_CHECK groom_status store_quality_get(struct store *store, const struct store_quality *key, char **report,
+                                                struct groom_diag *diag);
+/* Replaces one that is there. */
+GROOM_MUST_CHECK groom_status store_quality_put(struct store *store, const struct store_quality *key, const char *report,
+                                                struct groom_diag *diag);
 
 /* --- jobs ------------------------------------------------------------------------------------ */
 

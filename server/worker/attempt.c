@@ -9,6 +9,7 @@
 #include "groom/fit.h"
 #include "groom/format.h"
 #include "groom/mesh.h"
+#include "groom/quality.h"
 #include "groom/strands.h"
 #include "proto/work.h"
 #include "server/worker/blob.h"
@@ -30,6 +31,8 @@ struct attempt {
     struct groom_strands *strands;
     struct groom_mesh *head;
     struct groom_fit *fit;
+    struct groom *groom;  /* of the fit, once it is done */
+    char *fit_report, *quality; /* JSON; quality: NULL where the strands cannot be compared */
     struct groom_diag diag;
 };
 
@@ -143,8 +146,57 @@ static groom_status work(struct attempt *a)
     return st;
 }
 
+/* --- the result --------------------------------------------------------------------------------- */
+
+/* What the fit has made; the fit itself gives its memory back. */
+static groom_status take_groom(struct attempt *a)
+{
+    groom_status st = groom_fit_report_print(a->fit, &a->fit_report, &a->diag);
+    if (st == GROOM_OK)
+        st = groom_fit_result(a->fit, &a->context, &a->groom, &a->diag);
+    if (st != GROOM_OK)
+        return st;
+    snprintf(a->groom->name, sizeof a->groom->name, "%s", a->order.strands.name);
+    progress_report_compare(&a->report);
+    groom_fit_destroy(a->fit);
+    a->fit = NULL;
+    return GROOM_OK;
+}
+
+static groom_status compare(struct attempt *a, struct groom_diag *diag)
+{
+    struct groom_quality_target *target = NULL;
+    struct groom_quality fitted, drawn;
+    groom_status st = take_input(a, &a->order.strands, read_strands);
+    if (st != GROOM_OK)
+        *diag = a->diag;
+    if (st == GROOM_OK)
+        st = groom_quality_target_create(a->strands, a->head, NULL, &a->context, &target, diag);
+    groom_strands_destroy(a->strands);
+    a->strands = NULL;
+    if (st == GROOM_OK)
+        st = groom_quality_of_groom(target, a->groom, &a->context, &fitted, &drawn, diag);
+    if (st == GROOM_OK)
+        st = groom_quality_print(&fitted, &drawn, &a->quality, diag);
+    groom_quality_target_destroy(target);
+    return st;
+}
+
+/* A groom without a report is still a groom: one strand alone, say, cannot be cut into halves. */
+static groom_status measure(struct attempt *a)
+{
+    struct groom_diag diag = {0};
+    groom_status st = progress_report_send(&a->report, 1);
+    if (st == GROOM_OK)
+        st = compare(a, &diag);
+    if (st == GROOM_OK || st == GROOM_ECANCELLED)
+        return st;
+    fprintf(stderr, "groom-worker: warning: there is no quality report: %s\n", diag.detail);
+    return GROOM_OK;
+}
+
 /* The members of the document that the model does not own. */
-static char *surroundings(const struct attempt *a, const char *fit_report)
+static char *surroundings(const struct attempt *a)
 {
     cJSON *around = cJSON_CreateObject(), *source, *fit;
     cJSON_AddStringToObject(around, "name", a->order.strands.name);
@@ -155,11 +207,13 @@ static char *surroundings(const struct attempt *a, const char *fit_report)
     else
         cJSON_AddNullToObject(source, "head");
     cJSON_AddStringToObject(source, "job", a->order.job);
-    fit = cJSON_Parse(fit_report);
+    fit = cJSON_Parse(a->fit_report);
     if (!fit)
         fit = cJSON_CreateObject();
     cJSON_AddItemToObject(fit, "options", cJSON_Parse(a->order.options));
     cJSON_AddItemToObject(around, "fit", fit);
+    if (a->quality)
+        cJSON_AddRawToObject(around, "quality", a->quality);
     char *text = cJSON_PrintUnformatted(around);
     cJSON_Delete(around);
     return text;
@@ -167,18 +221,8 @@ static char *surroundings(const struct attempt *a, const char *fit_report)
 
 static groom_status write_result(struct attempt *a, char **json, size_t *n_bytes)
 {
-    struct groom *groom = NULL;
-    char *report = NULL, *around = NULL;
-    groom_status st = groom_fit_report_print(a->fit, &report, &a->diag);
-    if (st == GROOM_OK)
-        st = groom_fit_result(a->fit, &a->context, &groom, &a->diag);
-    if (st == GROOM_OK) {
-        snprintf(groom->name, sizeof groom->name, "%s", a->order.strands.name);
-        around = surroundings(a, report);
-        st = groom_document_write(groom, around, NULL, json, n_bytes, &a->diag);
-    }
-    groom_destroy(groom);
-    free(report);
+    char *around = surroundings(a);
+    groom_status st = groom_document_write(a->groom, around, NULL, json, n_bytes, &a->diag);
     free(around);
     return st;
 }
@@ -233,6 +277,9 @@ static int fail(struct attempt *a, groom_status status)
 
 static void release(struct attempt *a)
 {
+    free(a->fit_report);
+    free(a->quality);
+    groom_destroy(a->groom);
     groom_fit_destroy(a->fit);
     groom_mesh_destroy(a->head);
     groom_strands_destroy(a->strands);
@@ -256,6 +303,10 @@ static groom_status run(struct attempt *a)
         st = take_up(a);
     if (st == GROOM_OK)
         st = work(a);
+    if (st == GROOM_OK)
+        st = take_groom(a);
+    if (st == GROOM_OK)
+        st = measure(a);
     if (st == GROOM_OK)
         st = deliver(a);
     return st;

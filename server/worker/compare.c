@@ -11,7 +11,7 @@
 
 /* A file of the command line, and the frame that it is in. */
 struct named_file {
-    const char *path, *unit, *up;
+    const char *path, *format, *unit, *up;
     struct groom_frame frame;
     struct worker_input input;
 };
@@ -25,7 +25,7 @@ static int parse(int argc, char **argv, struct request *request)
     static const struct option options[] = {
         {"unit", 1, NULL, 'u'},      {"up", 1, NULL, 'a'},        {"target", 1, NULL, 't'},    {"target-unit", 1, NULL, 'T'},
         {"target-up", 1, NULL, 'p'}, {"head", 1, NULL, 'h'},      {"head-unit", 1, NULL, 'H'}, {"head-up", 1, NULL, 'A'},
-        {"drawn", 1, NULL, 'd'},     {NULL, 0, NULL, 0}};
+        {"drawn", 1, NULL, 'd'},     {"format", 1, NULL, 'f'},    {"target-format", 1, NULL, 'F'}, {NULL, 0, NULL, 0}};
     int c;
     while ((c = getopt_long(argc, argv, "", options, NULL)) != -1) {
         switch (c) {
@@ -37,6 +37,8 @@ static int parse(int argc, char **argv, struct request *request)
         case 'h': request->head.path = optarg; break;
         case 'H': request->head.unit = optarg; break;
         case 'A': request->head.up = optarg; break;
+        case 'f': request->groom.format = optarg; break;
+        case 'F': request->target.format = optarg; break;
         case 'd': request->drawn.path = optarg; break;
         default: return 0;
         }
@@ -45,6 +47,7 @@ static int parse(int argc, char **argv, struct request *request)
         fprintf(stderr, "groom-worker compare: \"%s\" is one argument too many\n", argv[optind]);
     else if (!request->target.path)
         fputs("groom-worker compare: --target FILE is missing\n", stderr);
+    request->drawn.format = request->groom.format;
     request->drawn.unit = request->groom.unit;
     request->drawn.up = request->groom.up;
     return optind == argc && request->target.path;
@@ -66,6 +69,8 @@ static groom_status read_strands(struct named_file *file, const struct groom_sou
 {
     groom_status st = worker_frame_parse(file->unit, file->up, &file->frame, diag);
     struct groom_read_options options = {.frame = file->frame};
+    if (st == GROOM_OK && file->format)
+        st = groom_format_parse(file->format, &options.format, diag);
     return st == GROOM_OK ? groom_strands_read(source, &options, context, strands, NULL, diag) : st;
 }
 

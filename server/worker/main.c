@@ -22,11 +22,11 @@ static const struct command {
     {"check-groom", worker_check_groom, "a groom document on standard input; its canonical form on standard output"},
     {"render", worker_render,
      "[--unit U] [--up y|z] [--head FILE] [--head-unit U] [--head-up y|z] [--view V] [--size N]\n"
-     "                 [--framed-as FILE] [--framed-unit U] [--framed-up y|z]\n"
+     "                 [--format F] [--framed-as FILE] [--framed-format F] [--framed-unit U] [--framed-up y|z]\n"
      "                 strands on standard input; a picture of them, as PNG, on standard output"},
     {"compare", worker_compare,
-     "--target FILE [--target-unit U] [--target-up y|z] [--head FILE] [--head-unit U] [--head-up y|z]\n"
-     "                 [--drawn FILE] [--unit U] [--up y|z]   strands on standard input; how alike they are to the\n"
+     "--target FILE [--target-format F] [--target-unit U] [--target-up y|z] [--head FILE] [--head-unit U] [--head-up y|z]\n"
+     "                 [--drawn FILE] [--format F] [--unit U] [--up y|z]   strands on standard input; how alike they are to the\n"
      "                 target's, as JSON, on standard output. --drawn: the same groom's before stage randoms"},
     {"attempt", worker_attempt,
      "[--watched] one attempt of a job, as GROOM_WORK_URL and GROOM_WORK_TOKEN name it; watched by a second\n"

@@ -15,12 +15,39 @@
 
 /* --- the message -------------------------------------------------------------------------- */
 
-static void add_stage(cJSON *message, const struct groom_fit_progress *progress)
+/* The quality report is a stage of its own behind those of the fit. */
+#define REPORT_STAGE "quality"
+#define REPORT_SHARE 0.1
+
+static uint32_t n_fit_stages(void)
 {
+    uint32_t n = 0;
+    while (groom_fit_stage_name(n))
+        n++;
+    return n;
+}
+
+static int stands_somewhere(const struct progress_report *report) { return report->fit || report->compared >= 0; }
+
+/* Of all of the job. */
+static double fraction_of(const struct progress_report *report)
+{
+    struct groom_fit_progress progress;
+    if (!report->fit)
+        return 1 - REPORT_SHARE * (1 - report->compared);
+    groom_fit_progress(report->fit, &progress);
+    return progress.fraction * (1 - REPORT_SHARE);
+}
+
+static void add_stage(cJSON *message, const struct progress_report *report)
+{
+    struct groom_fit_progress progress = {.stage = REPORT_STAGE, .index = n_fit_stages()};
+    if (report->fit)
+        groom_fit_progress(report->fit, &progress);
     cJSON *stage = cJSON_AddObjectToObject(message, "stage");
-    cJSON_AddStringToObject(stage, "name", progress->stage);
-    cJSON_AddNumberToObject(stage, "index", progress->index);
-    cJSON_AddNumberToObject(stage, "count", progress->count);
+    cJSON_AddStringToObject(stage, "name", progress.stage);
+    cJSON_AddNumberToObject(stage, "index", progress.index);
+    cJSON_AddNumberToObject(stage, "count", n_fit_stages() + 1);
 }
 
 static void add_time_left(cJSON *message, const struct progress_report *report, double fraction, double now_s)
@@ -49,12 +76,11 @@ static void add_losses(cJSON *message, const struct progress_report *report)
 char *progress_report_text(const struct progress_report *report, double now_s)
 {
     cJSON *message = cJSON_CreateObject();
-    if (report->fit) {
-        struct groom_fit_progress progress;
-        groom_fit_progress(report->fit, &progress);
-        add_stage(message, &progress);
-        cJSON_AddNumberToObject(message, "progress", progress.fraction);
-        add_time_left(message, report, progress.fraction, now_s);
+    if (stands_somewhere(report)) {
+        double fraction = fraction_of(report);
+        add_stage(message, report);
+        cJSON_AddNumberToObject(message, "progress", fraction);
+        add_time_left(message, report, fraction, now_s);
     }
     add_losses(message, report);
     char *text = cJSON_PrintUnformatted(message);
@@ -137,20 +163,34 @@ static void on_loss(void *user, const char *name, uint64_t iteration, double val
     loss->value = value;
 }
 
+static void on_report(void *user, double fraction)
+{
+    struct progress_report *report = user;
+    if (report->compared < 0)
+        return;
+    report->compared = fmin(fmax(report->compared, (report->n_compared + fraction) / 2), 1);
+    report->n_compared += fraction >= 1;
+}
+
 static int on_cancelled(void *user) { return progress_report_send(user, 0) != GROOM_OK; }
 
 void progress_report_init(struct progress_report *report, struct work_link *link)
 {
     memset(report, 0, sizeof *report);
     report->link = link;
-    report->callbacks = (struct groom_progress){.loss = on_loss, .cancelled = on_cancelled, .user = report};
+    report->compared = -1;
+    report->callbacks = (struct groom_progress){.report = on_report, .loss = on_loss, .cancelled = on_cancelled, .user = report};
 }
 
 void progress_report_follow(struct progress_report *report, const struct groom_fit *fit)
 {
-    struct groom_fit_progress progress;
-    groom_fit_progress(fit, &progress);
     report->fit = fit;
-    report->first_fraction = progress.fraction;
+    report->first_fraction = fraction_of(report);
     report->started_s = clock_s();
+}
+
+void progress_report_compare(struct progress_report *report)
+{
+    report->fit = NULL;
+    report->compared = 0;
 }

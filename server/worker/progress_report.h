@@ -9,7 +9,9 @@
 
 struct progress_report {
     struct work_link *link;
-    const struct groom_fit *fit;       /* NULL before there is one */
+    const struct groom_fit *fit;       /* NULL before there is one, and after it */
+    double compared;                   /* 0..1 of the quality report that follows it; negative: not begun */
+    uint32_t n_compared;               /* of its two comparisons that are done */
     double first_fraction, started_s;  /* of this attempt: what the time left is reckoned from */
     double sent_s;
     int halted;                        /* the daemon said cancel, or the line is gone: stop */
@@ -22,6 +24,8 @@ struct progress_report {
 void progress_report_init(struct progress_report *report, struct work_link *link);
 /* From here on it knows the fit; where it stands now is where this attempt began. */
 void progress_report_follow(struct progress_report *report, const struct groom_fit *fit);
+/* The fit is done and may go; what the library reports from here on is the quality report's progress. */
+void progress_report_compare(struct progress_report *report);
 /* Send where half a second has gone by, or `now`.
  * returns  GROOM_OK, GROOM_ECANCELLED */
 GROOM_MUST_CHECK groom_status progress_report_send(struct progress_report *report, int now);

@@ -11,7 +11,7 @@
 
 struct request {
     const char *unit, *up, *head, *head_unit, *head_up, *view, *size;
-    const char *as, *as_unit, *as_up; /* other strands, whose camera is taken */
+    const char *format, *as, *as_format, *as_unit, *as_up; /* other strands, whose camera is taken */
     struct groom_frame frame, head_frame, as_frame;
     struct groom_render_options options;
     struct worker_input head_input, as_input;
@@ -22,7 +22,8 @@ static int parse(int argc, char **argv, struct request *request)
     static const struct option options[] = {
         {"unit", 1, NULL, 'u'},    {"up", 1, NULL, 'a'},      {"head", 1, NULL, 'h'}, {"head-unit", 1, NULL, 'U'},
         {"head-up", 1, NULL, 'A'}, {"view", 1, NULL, 'v'},    {"size", 1, NULL, 's'},
-        {"framed-as", 1, NULL, 'f'}, {"framed-unit", 1, NULL, 'F'}, {"framed-up", 1, NULL, 'g'}, {NULL, 0, NULL, 0}};
+        {"framed-as", 1, NULL, 'f'}, {"framed-unit", 1, NULL, 'F'}, {"framed-up", 1, NULL, 'g'},
+        {"format", 1, NULL, 'm'}, {"framed-format", 1, NULL, 'M'}, {NULL, 0, NULL, 0}};
     int c;
     while ((c = getopt_long(argc, argv, "", options, NULL)) != -1) {
         switch (c) {
@@ -33,6 +34,8 @@ static int parse(int argc, char **argv, struct request *request)
         case 'A': request->head_up = optarg; break;
         case 'v': request->view = optarg; break;
         case 's': request->size = optarg; break;
+        case 'm': request->format = optarg; break;
+        case 'M': request->as_format = optarg; break;
         case 'f': request->as = optarg; break;
         case 'F': request->as_unit = optarg; break;
         case 'g': request->as_up = optarg; break;
@@ -79,6 +82,8 @@ static groom_status render(void *user, struct worker_input *input, const struct 
     groom_status st = interpret(request, diag);
     struct groom_read_options read = {.frame = request->frame}, read_as = {.frame = request->as_frame};
     struct groom_mesh_read_options read_head = {.frame = request->head_frame};
+    if (st == GROOM_OK && request->format) st = groom_format_parse(request->format, &read.format, diag);
+    if (st == GROOM_OK && request->as_format) st = groom_format_parse(request->as_format, &read_as.format, diag);
     if (st == GROOM_OK) st = groom_strands_read(&input->source, &read, context, &strands, NULL, diag);
     if (st == GROOM_OK && request->head)
         st = groom_mesh_read(&request->head_input.source, &read_head, context, &mesh, NULL, diag);

@@ -237,7 +237,7 @@ static struct groom_fit *small_fit(void)
     return fit;
 }
 
-START_TEST(progress_is_told_from_the_fit_alone)
+START_TEST(progress_is_told_from_the_fit_and_its_report)
 {
     struct progress_report report;
     struct groom_fit *fit = small_fit();
@@ -258,9 +258,15 @@ START_TEST(progress_is_told_from_the_fit_alone)
     while (!groom_fit_done(fit))
         ck_ok(groom_fit_step(fit, NULL, NULL));
     text = progress_report_text(&report, report.started_s + 1);
-    ck_assert_ptr_nonnull(strstr(text, "\"progress\":1,\"eta_s\":0,"));
+    ck_assert_ptr_nonnull(strstr(text, "\"progress\":0.9,\"eta_s\":0.1,"));
     free(text);
     groom_fit_destroy(fit);
+    progress_report_compare(&report);
+    report.callbacks.report(report.callbacks.user, 0.5);
+    text = progress_report_text(&report, report.started_s + 1);
+    ck_assert_ptr_nonnull(strstr(text, "\"stage\":{\"name\":\"quality\","));
+    ck_assert_ptr_nonnull(strstr(text, "\"progress\":0.925,"));
+    free(text);
 }
 END_TEST
 
@@ -380,6 +386,6 @@ TEST_SUITE("worker", order_reads_inputs_options_and_checkpoint, order_refuses_wh
            link_stops_waiting_when_the_process_is_to_end, blob_is_verified_and_a_broken_line_taken_up_again,
            blob_of_other_bytes_is_refused, blob_comes_from_a_shared_folder_where_there_is_one,
            counts_are_whole_numbers_in_range, problem_carries_offset_and_pointer,
-           sandbox_leaves_threads_and_memory_and_no_way_out, progress_is_told_from_the_fit_alone,
+           sandbox_leaves_threads_and_memory_and_no_way_out, progress_is_told_from_the_fit_and_its_report,
            losses_are_thinned_and_the_newest_kept, a_checkpoint_that_does_not_fit_is_passed_over,
            input_is_read_whole_from_a_pipe_within_its_limit)
