@@ -87,6 +87,14 @@ static const struct option_spec preview_options[] = {
     {0},
 };
 
+static const struct option_spec compare_options[] = {
+    {"revision", 0, "N", "of GROOM (the latest)"},
+    {"unit", 0, "U", "of files: m, cm, mm, dm, in, or a number of metres (m)"},
+    {"up", 0, "A", "their up axis: y or z (y)"},
+    {"head-file", 0, "FILE", "of files: the head, in the same unit, for what is inside it"},
+    {0},
+};
+
 static const struct option_spec edit_options[] = {
     {"if-match", 0, "N", "refuse unless the latest revision is this one"},
     {0},
@@ -118,6 +126,8 @@ const struct command groomctl_commands[] = {
     {"export", "GROOM|STRANDS", 1, 1, export_options, "strands or guides into a file", command_export},
     {"analyze", "GROOM|STRANDS", 1, 1, analyze_options, "what kind of hair it is: curls, handedness, switchbacks", command_analyze},
     {"preview", "GROOM", 1, 1, preview_options, "a shaded picture", command_preview},
+    {"compare", "GROOM|STRANDS|FILE [TARGET]", 1, 2, compare_options,
+     "how alike strands are to a target; a groom's own is what it was fitted to; two files need no server", command_compare},
     {"set", "GROOM /POINTER=VALUE...", 2, MANY, edit_options, "change a groom: /operators/2/radius=0.01", command_set},
     {"patch", "GROOM FILE", 2, 2, edit_options, "change a groom by a JSON Patch or merge patch", command_patch},
     {"revisions", "GROOM", 1, 1, NULL, "the history of a groom", command_revisions},

@@ -55,6 +55,7 @@ int command_set(struct groomctl *ctl, const struct arguments *arguments);
 int command_patch(struct groomctl *ctl, const struct arguments *arguments);
 int command_revisions(struct groomctl *ctl, const struct arguments *arguments);
 int command_revert(struct groomctl *ctl, const struct arguments *arguments);
+int command_compare(struct groomctl *ctl, const struct arguments *arguments);
 int command_sample(struct groomctl *ctl, const struct arguments *arguments);
 int command_options(struct groomctl *ctl, const struct arguments *arguments);
 int command_completion(struct groomctl *ctl, const struct arguments *arguments);
