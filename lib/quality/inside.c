@@ -20,28 +20,50 @@ static double between(const float *a, const float *b)
     return sqrt(x * x + y * y + z * z);
 }
 
-/* A vertex d metres outside has none inside within d metres along its strand: those are passed over. */
+/* Vertex j is deep; `run`: the one before it is, too. */
+static void count_deep(const float (*x)[3], uint32_t j, int run, struct groom_quality_head *sum)
+{
+    sum->vertices++;
+    sum->segments += run != 0;
+    sum->share += run ? between(x[j - 1], x[j]) : 0;
+}
+
+static double distance_to(const struct groom_bvh *head, const float p[3])
+{
+    struct groom_surface_point closest;
+    return groom_bvh_closest(head, p, INFINITY, &closest) ? closest.distance : INFINITY;
+}
+
+/* Which side a vertex is on: that of the one before it, unless the surface is between. */
+static int side_of(const struct groom_bvh *head, const float *before, const float *here, int in)
+{
+    float way[3] = {here[0] - before[0], here[1] - before[1], here[2] - before[2]};
+    return groom_bvh_occluded(head, before, way, 0, 1) ? groom_bvh_inside(head, here) : in;
+}
+
+/* A vertex that is d metres from deep, or from no longer being so, speaks for those within d metres along
+ * its strand, which are not looked at. */
 static void look_at(const struct looking *job, uint32_t i, struct groom_quality_head *sum)
 {
-    uint32_t m = job->set->m, deep = 0;
+    uint32_t m = job->set->m, before = sum->vertices;
     const float (*x)[3] = (const float (*)[3])(job->set->points + (size_t)i * m);
-    int before = 0;
-    for (uint32_t j = 1; j < m; j++) {
-        double depth = -(double)groom_bvh_signed_distance(job->head, x[j]), walked = 0;
-        if (depth > DEEP) {
-            deep++;
-            sum->deepest = fmax(sum->deepest, depth);
-            sum->segments += before != 0;
-            sum->share += before ? between(x[j - 1], x[j]) : 0;
-            before = 1;
-            continue;
-        }
-        before = 0;
-        while (j + 1 < m && (walked += between(x[j], x[j + 1])) < DEEP - depth)
-            j++;
+    int run = 0, in = groom_bvh_inside(job->head, x[1]);
+    for (uint32_t j = 1; j < m;) {
+        double distance = distance_to(job->head, x[j]), depth = in ? distance : -distance, walked = 0;
+        int deep = depth > DEEP;
+        sum->deepest = deep ? fmax(sum->deepest, depth) : sum->deepest;
+        do {
+            if (deep)
+                count_deep(x, j, run, sum);
+            run = deep;
+            if (++j == m)
+                break;
+            walked += between(x[j - 1], x[j]);
+            if (walked >= distance)
+                in = side_of(job->head, x[j - 1], x[j], in);
+        } while (walked < fabs(depth - DEEP));
     }
-    sum->vertices += deep;
-    sum->strands += deep > 0;
+    sum->strands += sum->vertices > before;
 }
 
 static void look_piece(void *user, uint32_t piece, uint32_t thread)

@@ -24,17 +24,22 @@ struct asking {
     struct counts *counts; /* [pieces] */
 };
 
+/* Hair of 3 cm in all is none, or its unit is wrong: everything would be near everything, and take hours. */
+#define LEAST_WIDTH 0.03
+
 static void ask(const struct asking *job, const struct quality_place *place, float *distance, struct counts *counts)
 {
     int found[GROOM_QUALITY_TOLERANCES] = {0};
     float squared, cosine;
     segment_grid_nearest(job->to, place, &squared, &cosine);
     *distance = sqrtf(squared);
-    if (*distance <= job->tolerance[GROOM_QUALITY_TOLERANCES - 1])
+    int all = *distance <= job->tolerance[0] && cosine >= job->cosine[0];
+    if (!all && *distance <= job->tolerance[GROOM_QUALITY_TOLERANCES - 1] && job->to->widest >= LEAST_WIDTH)
         segment_grid_matches(job->to, place, job->tolerance, job->cosine, GROOM_QUALITY_TOLERANCES, found);
     for (int k = 0; k < GROOM_QUALITY_TOLERANCES; k++) {
-        counts->any[k] += (uint32_t)found[k];
-        counts->strict[k] += *distance <= job->tolerance[k] && cosine >= job->cosine[k];
+        int strict = *distance <= job->tolerance[k] && cosine >= job->cosine[k];
+        counts->any[k] += strict || found[k];
+        counts->strict[k] += (uint32_t)strict;
     }
 }
 

@@ -15,7 +15,7 @@
 #define STREAM_HALVES 0x71750003u
 #define DEFAULT_VERTICES 100
 #define DEFAULT_STRANDS 10000
-#define DEFAULT_PLACES 200000
+#define DEFAULT_PLACES 60000
 #define PIECE 256u /* strands */
 
 struct groom_quality_target {

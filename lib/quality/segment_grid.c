@@ -8,7 +8,9 @@
 #define SIDE 8u               /* cells along a block */
 #define CELLS (SIDE * SIDE * SIDE)
 #define MOST_BLOCKS 128u      /* along the box */
-#define CELL_SIZE 0.5         /* of a segment's mean length */
+#define CELL_SIZE 0.5         /* of a segment's mean length, or more: */
+#define CELL_METRES 0.0015    /* half of the tolerance that is asked about */
+#define LEAST_CELLS 128       /* along the longest side of the box */
 #define LONGEST 1.25          /* piece of a segment, of the mean length */
 #define MOST_PIECES 65536u    /* of one segment */
 
@@ -48,7 +50,9 @@ static void place_box(struct segment_grid *grid, const struct quality_set *set, 
         }
     for (int c = 0; c < 3; c++)
         widest = fmaxf(widest, high[c] - low[c]);
-    grid->cell = (float)fmax(CELL_SIZE * mean, 1.001 * widest / (MOST_BLOCKS * SIDE));
+    double cell = fmin(fmax(CELL_SIZE * mean, CELL_METRES), widest / LEAST_CELLS);
+    grid->cell = (float)fmax(cell, 1.001 * widest / (MOST_BLOCKS * SIDE));
+    grid->widest = widest;
     for (int c = 0; c < 3; c++) {
         grid->origin[c] = low[c];
         grid->n_across[c] = (uint32_t)((high[c] - low[c]) / (grid->cell * SIDE)) + 1;

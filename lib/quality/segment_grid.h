@@ -13,6 +13,7 @@ struct grid_segment {
 
 struct segment_grid {
     float origin[3], cell;       /* metres */
+    float widest;                /* side of the box */
     uint32_t n_across[3];        /* blocks */
     uint32_t *block_of;          /* [blocks of the box] index among those stored, or UINT32_MAX */
     uint32_t n_blocks;

@@ -19,7 +19,8 @@
  * within a distance whose direction, root to tip, is within an angle of their own; recall the same from
  * the target's places; the F-score their harmonic mean. This is how papers on reconstruction count
  * (Nam et al. 2019; NeuralHaircut, GaussianHaircut). The stricter reading, that the direction of the
- * nearest segment alone decides, stands beside it as `nearest_...`. The floor is A against B.
+ * nearest segment alone decides, stands beside it as `nearest_...`, and in place of it for sets smaller than
+ * 3 cm, among which everything is near. The floor is A against B.
  *
  * Head: how many strands, and how much of their length, lies more than 1 mm inside.
  * Paired: where both sets have as many strands, strand i against strand i, vertex by vertex. */
@@ -41,7 +42,7 @@ struct groom_mesh;
 struct groom_quality_options {
     uint32_t vertices; /* of each strand; 0: 100. 3 at least */
     uint32_t strands;  /* of each half that is compared; 0: 10 000 */
-    uint32_t places;   /* of each set; 0: 200 000 */
+    uint32_t places;   /* of each set; 0: 60 000 */
     uint64_t seed;     /* of the halves and of the directions of slices */
 };
 
@@ -70,7 +71,7 @@ struct groom_quality_head {
     uint32_t vertices;  /* that deep, roots left out */
     uint32_t segments;  /* both of whose ends are that deep */
     double share;       /* of all length, in such segments */
-    double deepest;     /* metres; 0 where none is inside */
+    double deepest;     /* metres, of the vertices that were looked at: those near another are not; 0: none is inside */
 };
 
 struct groom_quality {
