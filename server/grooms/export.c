@@ -96,7 +96,7 @@ groom_status grooms_write_strands(struct grooms *grooms, const char *groom_id, c
                                   struct groom_sink sink, struct groom_diag *diag)
 {
     struct model *model = NULL;
-    struct groom *fewer = NULL, rest;
+    struct groom *fewer = NULL, rest = {0};
     struct state *state = NULL;
     groom_status status = models_acquire(grooms, groom_id, what->revision, &model, diag);
     if (status != GROOM_OK)
@@ -106,7 +106,7 @@ groom_status grooms_write_strands(struct grooms *grooms, const char *groom_id, c
     else if (what->count > model->groom->n_strands)
         status = groom_fail_field(diag, GROOM_EINVAL, "/count", "the groom has %u strands: ask for at most as many",
                                   model->groom->n_strands);
-    if (status == GROOM_OK)
+    if (status == GROOM_OK && !what->drawn)
         status = evaluate_rest(grooms, model, &rest, &state, diag);
     if (status == GROOM_OK && what->count && what->count < rest.n_strands)
         status = select_fairly(&rest, what->count, &fewer, NULL, diag);

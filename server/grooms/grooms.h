@@ -139,7 +139,8 @@ struct grooms_export {
     struct groom_write_options write;
     uint32_t count;    /* of strands: a fair sample of them, the same for every revision, and each
                         * smaller one part of the larger ones. 0: all */
-    bool drawn;        /* all strands, with every random number drawn from its operator's seed */
+    bool drawn;        /* all strands, with every random number drawn from its operator's seed; GROOM_EINVAL
+                        * where layers stand in the chain */
 };
 
 /* Strands 0..n-1 of a revision, evaluated piece by piece into the sink. */
