@@ -9,6 +9,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "fit/dense.h"
+#include "model/kernel.h"
 
 #define PI 3.14159265358979323846
 #define PAIRS_PER_PIECE 16
@@ -113,35 +114,75 @@ static void make_windows(uint32_t m, struct windows *windows)
 }
 
 /* Segments of both strands of a pair at the same turns a segment, so that their difference means something. */
-static void transform(const struct windows *windows, const float (*points)[3], uint32_t m, const double turns[N_FREQ],
-                      struct spectrum *spectrum)
+/* Frequencies side by side: the compiler's own vector type, element by element, as wide as a register. */
+#define SIDE_BY_SIDE 8
+typedef float waves __attribute__((vector_size(sizeof(float) * SIDE_BY_SIDE)));
+
+LANES_INLINE void add_waves(float *to, waves wave, float e)
 {
-    float cosine[N_FREQ], sine[N_FREQ], step_cosine[N_FREQ], step_sine[N_FREQ];
-    memset(spectrum, 0, sizeof *spectrum);
-    for (int q = 0; q < N_FREQ; q++) {
-        cosine[q] = 1, sine[q] = 0;
-        step_cosine[q] = (float)cos(2 * PI * turns[q]);
-        step_sine[q] = (float)sin(2 * PI * turns[q]);
+    waves sum;
+    memcpy(&sum, to, sizeof sum);
+    sum += wave * e;
+    memcpy(to, &sum, sizeof sum);
+}
+
+/* Of frequencies first .. first + SIDE_BY_SIDE - 1. */
+LANES_INLINE void transform_some(const struct windows *windows, const float (*points)[3], uint32_t m, const double *turns,
+                                 int first, struct spectrum *spectrum)
+{
+    waves cosine = {0}, sine = {0}, step_cosine = {0}, step_sine = {0};
+    for (int q = 0; q < SIDE_BY_SIDE; q++) {
+        cosine[q] = 1;
+        step_cosine[q] = (float)cos(2 * PI * turns[first + q]);
+        step_sine[q] = (float)sin(2 * PI * turns[first + q]);
     }
     for (uint32_t j = 0; j + 1 < m; j++) {
         const float *weight = windows->weight[j];
-        for (int w = 0; w < 1 + MOMENTS_WINDOWS; w++) {
-            if (weight[w] == 0)
-                continue;
-            for (int c = 0; c < 3; c++) {
+        for (int w = 0; w < 1 + MOMENTS_WINDOWS; w++)
+            for (int c = 0; c < 3 && weight[w] != 0; c++) {
                 float e = weight[w] * (points[j + 1][c] - points[j][c]);
-                for (int q = 0; q < N_FREQ; q++) {
-                    spectrum->re[w][c][q] += cosine[q] * e;
-                    spectrum->im[w][c][q] += sine[q] * e;
-                }
+                add_waves(spectrum->re[w][c] + first, cosine, e);
+                add_waves(spectrum->im[w][c] + first, sine, e);
             }
-        }
-        for (int q = 0; q < N_FREQ; q++) {
-            float next = cosine[q] * step_cosine[q] - sine[q] * step_sine[q];
-            sine[q] = sine[q] * step_cosine[q] + cosine[q] * step_sine[q];
-            cosine[q] = next;
-        }
+        waves next = cosine * step_cosine - sine * step_sine;
+        sine = sine * step_cosine + cosine * step_sine;
+        cosine = next;
     }
+}
+
+LANES_INLINE void transform_body(const struct windows *windows, const float (*points)[3], uint32_t m,
+                                 const double turns[N_FREQ], struct spectrum *spectrum)
+{
+    memset(spectrum, 0, sizeof *spectrum);
+    for (int first = 0; first < N_FREQ; first += SIDE_BY_SIDE)
+        transform_some(windows, points, m, turns, first, spectrum);
+}
+
+static void transform_baseline(const struct windows *windows, const float (*points)[3], uint32_t m,
+                               const double turns[N_FREQ], struct spectrum *spectrum)
+{
+    transform_body(windows, points, m, turns, spectrum);
+}
+
+#if defined(__x86_64__)
+KERNEL_TARGET_AVX2 static void transform_avx2(const struct windows *windows, const float (*points)[3], uint32_t m,
+                                              const double turns[N_FREQ], struct spectrum *spectrum)
+{
+    transform_body(windows, points, m, turns, spectrum);
+}
+#endif
+
+/* The same bits in all variants: a frequency a lane, and no multiply-adds in one. */
+static void transform(const struct windows *windows, const float (*points)[3], uint32_t m, const double turns[N_FREQ],
+                      struct spectrum *spectrum)
+{
+#if defined(__x86_64__)
+    if (kernel_best_variant() == KERNEL_AVX2) {
+        transform_avx2(windows, points, m, turns, spectrum);
+        return;
+    }
+#endif
+    transform_baseline(windows, points, m, turns, spectrum);
 }
 
 /* Power in window w at frequency q over that of a straight strand of the same length. */

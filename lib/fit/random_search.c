@@ -9,9 +9,9 @@
 #include "groom/strands.h"
 
 #define MOST_RATES 33          /* frequencies of a curl that are tried */
-#define PHASES 8               /* in a turn */
+#define PHASES 6               /* in a turn */
 #define LOCAL 5                /* both, around what there is */
-#define LOCAL_PASSES 3
+#define LOCAL_PASSES 2
 #define TURNS_PER_RATE 0.3     /* at a strand's tip from one frequency to the next */
 #define PERIOD (1.0f / 3.9f)   /* of u2: a whole turn */
 
@@ -237,7 +237,7 @@ static uint32_t rates_of(const struct curls_job *job, uint32_t guide)
 
 #define TRADES 13           /* frequencies that are tried */
 #define TRADE_STEP 0.02f    /* from one to the next, of the frequency */
-#define TRADE_PASSES 3
+#define TRADE_PASSES 2
 
 /* The turns a metre that a number makes. */
 static float rate_of(const struct groom_operator *op, float u) { return op->parameter[1] + op->parameter[2] * u; }
@@ -316,7 +316,7 @@ static void curl_piece(void *user, uint32_t piece, uint32_t thread)
         search_grid(job, memory, guide, &grid, u);
     }
     for (int pass = 0; pass < LOCAL_PASSES; pass++) {
-        rate_step *= 0.4f, phase_step *= 0.4f;
+        rate_step *= 0.35f, phase_step *= 0.35f;
         struct curl_grid grid = grid_around(u, rate_step, phase_step);
         search_grid(job, memory, guide, &grid, u);
     }

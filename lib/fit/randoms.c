@@ -22,14 +22,14 @@
 #define UNIT 0.1             /* metres on an ordinary head: what the paper's weights were made for */
 #define LOSS_STRANDS 4000    /* of which the losses are measured */
 #define SMOOTH_VALUES 24     /* of a number that the error is smooth in */
-#define HALVINGS 7           /* of the step around the best value */
+#define HALVINGS 3           /* of the step around the best value: Newton's steps do the rest */
 #define STEP_WORK 1200000    /* strands times values of one step: about a second */
 #define MOST_PASSES 256
 #define CANDIDATES 8         /* operator guides near a strand that it may follow */
 #define GAIN 0.1f            /* share of its error that another one must be better by */
 #define CURL_VALUES 256      /* about: values of a curl's numbers that are tried */
-#define POLISH_STEPS 3
-#define POLISH_VALUES 64     /* about: evaluations of them */
+#define POLISH_STEPS 2       /* in the last round; 1 in others */
+#define POLISH_VALUES 48     /* about: evaluations of them */
 
 /* --- the row of passes ------------------------------------------------------------------------- */
 
@@ -199,7 +199,8 @@ static groom_status search_guides(struct groom_fit *fit, struct random_search *s
     for (uint32_t o = 0; o < n; o++)
         memcpy(uv[o], groom->guide_uv[groom->operator_guide[o]], sizeof uv[o]);
     if ((st = groom_neighbours_create(uv[0], n, 2, context, &index, diag)) != GROOM_OK ||
-        (st = groom_neighbours_find(index, groom->root_uv[fit->iteration], count, CANDIDATES, candidate, NULL, context, diag)) != GROOM_OK)
+        (st = groom_neighbours_find(index, groom->root_uv[fit->iteration], count, CANDIDATES, candidate, NULL, context,
+                                    diag)) != GROOM_OK)
         goto out;
     for (size_t i = 0; i < (size_t)count * CANDIDATES; i++)
         if (candidate[i] != UINT32_MAX && !used[candidate[i]])
@@ -218,7 +219,8 @@ static uint32_t grid_of(const struct groom_fit *fit, const struct pass *pass)
 {
     uint32_t values = fit->options.stages.randoms.values;
     int rugged = fit->groom->operators[pass->op].type == GROOM_OPERATOR_FRIZZ;
-    return rugged || values < SMOOTH_VALUES ? values : SMOOTH_VALUES;
+    values = rugged || values < SMOOTH_VALUES ? values : SMOOTH_VALUES;
+    return pass->round == 0 ? values : (values + 1) / 2; /* what is better is near, or was found before */
 }
 
 /* Strands or operator guides of the next step. */
@@ -235,6 +237,11 @@ static uint32_t step_size(const struct groom_fit *fit, const struct pass *pass)
     return wanted < left ? wanted : left;
 }
 
+static int is_last(const struct groom_fit *fit, const struct pass *pass)
+{
+    return pass->round + 1 == fit->options.stages.randoms.rounds;
+}
+
 static groom_status search_pass(struct groom_fit *fit, struct random_search *search, const struct pass *pass,
                                 uint32_t count, const struct groom_context *context, struct groom_diag *diag)
 {
@@ -245,7 +252,8 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
         return GROOM_OK;
     case CURLS: return search_curls(fit, search, pass, count, context, diag);
     case POLISH:
-        random_search_polish(search, fit->iteration, count, POLISH_STEPS, (float)fit->options.stages.randoms.hold, context);
+        random_search_polish(search, fit->iteration, count, is_last(fit, pass) ? POLISH_STEPS : 1,
+                             (float)fit->options.stages.randoms.hold, context);
         return GROOM_OK;
     }
     return GROOM_EINTERNAL;

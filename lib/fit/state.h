@@ -51,9 +51,9 @@ struct fit_stage {
 #define FIT_STAGE_LIST(X)                                                                                    \
     X(initialize, 1.0)                                                                                       \
     X(instance_weights, 0.3)                                                                                 \
-    X(guides, 0.5)                                                                                               \
-    X(operators, 2.0)                                                                                        \
-    X(randoms, 2.0)
+    X(guides, 0.7)                                                                                               \
+    X(operators, 1.5)                                                                                        \
+    X(randoms, 5.0)
 
 enum {
 #define FIT_STAGE_INDEX(name, weight) FIT_STAGE_##name,
