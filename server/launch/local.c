@@ -11,6 +11,9 @@
 
 #include "server/launch/spawn.h"
 
+/* A fit takes all the processor it gets, for long; whoever waits for an answer comes first. */
+#define ATTEMPT_NICE 10
+
 /* --- handles: "local:PID:START:BOOT" ------------------------------------------------------ */
 
 struct process {
@@ -110,7 +113,7 @@ static groom_status local_start(struct launcher *launcher, const struct launch_s
         status = groom_fail(diag, errno == ENOSPC ? GROOM_ENOSPC : GROOM_EIO, "opening %s: %s", spec->log_path,
                             strerror(errno));
     } else {
-        struct spawn_spec spawn = {spec->argv, spec->env, {null_fd, log_fd, log_fd}, spec->limits};
+        struct spawn_spec spawn = {spec->argv, spec->env, {null_fd, log_fd, log_fd}, spec->limits, ATTEMPT_NICE};
         status = spawn_process(&spawn, &process.pid, diag);
     }
     if (null_fd >= 0)

@@ -60,6 +60,14 @@ static int pass_descriptors(const int fd[3])
     return close_range(3, ~0u, CLOSE_RANGE_CLOEXEC);
 }
 
+/* Where it cannot, it runs as it is. */
+static void give_way(int nice_by)
+{
+    errno = 0;
+    if (nice_by && nice(nice_by) == -1 && errno)
+        return; /* it runs as it is */
+}
+
 /* By system call: make 4.3 hands down signals 32 and 33 ignored, which the C library keeps for itself
  * and does not let anybody reset. */
 static void reset_signals(void)
@@ -94,6 +102,7 @@ static _Noreturn void become(const struct spawn_spec *spec, pid_t parent, int re
     static char *const nothing[] = {NULL};
     struct spawn_failure failure = {STEP_GROUP, 0};
     reset_signals();
+    give_way(spec->nice);
     if (setpgid(0, 0) == 0) {
         failure.step = STEP_PARENT;
         if (tie_to_parent(parent) == 0) {

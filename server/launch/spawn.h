@@ -12,6 +12,7 @@ struct spawn_spec {
     const char *const *env;  /* NULL: empty */
     int fd[3];               /* standard input, output, error; borrowed */
     struct launch_limits limits;
+    int nice;                /* added to ours: it gives way to the daemon */
 };
 
 /* Returns once the program has been executed. The caller waits for `*pid`.
