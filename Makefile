@@ -3,7 +3,9 @@
 #   make            groomd, groom-worker, groomctl and libgroom in build/
 #   make run        a daemon that has fitted the bundled sample, and the address to open
 #   make test       lint, unit, property, fuzz corpus, API and end-to-end tests
-#   make test-service  each write, sync, rename, allocation below the storage fails in turn
+#   make test-service  1 000 kills, 1 000 connections, 20 000 bent calls; below the storage each write, sync, rename and
+#                      allocation fails in turn (make test has short forms)
+#   make soak       SOAK_MINUTES (60) of a steady mixture: memory and descriptors stay flat
 #   make test-cluster  fits on a Slurm cluster of two nodes on loopback (installs slurm-wlm and munge)
 #   make test-deploy   the Debian package, the systemd unit, nginx in front (installs nginx)
 #   make deb        build/groomd_VERSION_ARCH.deb
@@ -63,7 +65,7 @@ PROGRAM_OF_server_groomd.c = groomd
 PROGRAM_OF_server_worker_main.c = groom-worker
 PROGRAM_OF_client_groomctl_main.c = groomctl
 
-.PHONY: all setup programs lib run test unit check-all test-service test-cluster test-deploy deb bench real-captures asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
+.PHONY: all setup programs lib run test unit check-all test-service soak test-cluster test-deploy deb bench real-captures asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
 .DEFAULT_GOAL := all
 
 all: setup
@@ -159,10 +161,16 @@ unit: programs tests
 api e2e: programs node-packages
 	@BUILD=$(BUILD) tests/run.sh $@
 
-# What a service must withstand, in full; `make test` has a short form of it.
+# What a service must withstand, in full; `make test` has short forms of it.
 test-service: setup
 	+@$(SUBMAKE) programs node-packages $(FAULT_LIBRARY)
-	@FAULTS=all BUILD=$(BUILD) tests/run.sh faults
+	@FAULTS=all BUILD=$(BUILD) KILLS=$(or $(KILLS),1000) CONNECTIONS=$(or $(CONNECTIONS),1000) \
+	    FUZZ_CALLS=$(or $(FUZZ_CALLS),20000) tests/run.sh faults e2e/kills e2e/connections api/fuzz
+
+SOAK_MINUTES ?= 60
+soak: setup
+	+@$(SUBMAKE) programs node-packages
+	@BUILD=$(BUILD) SOAK_SECONDS=$$(($(SOAK_MINUTES) * 60)) tests/run.sh e2e/soak
 
 # Not part of `make test`: it installs what most machines do not have.
 test-cluster: setup

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs the tests and closes with one line: N passed, N failed, N skipped.
-#   tests/run.sh [unit|api|e2e|cluster|deploy ...]     unit, api and e2e where none is named. BUILD is the build folder.
+#   tests/run.sh [unit|api|e2e|cluster|deploy ...]     unit, api and e2e where none is named; api/NAME: one file. BUILD is the build folder.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 BUILD=${BUILD:-build}
@@ -40,7 +40,8 @@ for kind in "${kinds[@]}"; do
     case $kind in
         unit) run_unit ;;
         api|e2e|faults|cluster|deploy) run_node "$kind" ;;
-        *) echo "tests/run.sh: unit, api, e2e, cluster or deploy, not $kind" >&2; exit 2 ;;
+        api/*|e2e/*) run "$kind" node --test --test-reporter=tap "tests/$kind.test.mjs" ;;
+        *) echo "tests/run.sh: unit, api, e2e, faults, cluster or deploy, not $kind" >&2; exit 2 ;;
     esac
 done
 
