@@ -17,6 +17,16 @@
  *   POST /v1/work/ended                2xx; body: {"words":"..."}: the process ends without either, and
  *                                      why; for launchers that learn late, or never, how it ended
  *
+ * Of an edit (kind "ruffle", "sculpt", "interpolate", "curl_scale"):
+ *   GET  /v1/work/layer                200 the layer as in a document, its arrays inline
+ *   GET  /v1/work/strands              200 the strands that come into it: HAIR, metres
+ *   POST /v1/work/result               2xx; body: a line {"report":{…},"contact":{…}?}, then the strands
+ *                                      that come out of it: HAIR. The report's numbers, each optional:
+ *                                      strands changed conversion_error seconds energy_before energy_after
+ *                                      anchors anchor_error_mean anchor_error_max iterations_median
+ *                                      iterations_max unfinished contact_checked contact_entered
+ *                                      contact_inside contact_depth_before contact_depth_after
+ *
  * The order:
  *   {"job":"job_...","kind":"fit","attempt":1,"options":{...},"request":{...},
  *    "inputs":{"strands":{"id","sha256","bytes","format","unit_m","up","name","path"?},
@@ -46,6 +56,8 @@
 #define WORK_ENV_PATIENCE "GROOM_WORK_PATIENCE"
 
 #define WORK_PATH_JOB        "/v1/work/job"
+#define WORK_PATH_LAYER      "/v1/work/layer"
+#define WORK_PATH_STRANDS    "/v1/work/strands"
 #define WORK_PATH_BLOBS      "/v1/work/blobs" /* "/{sha256}" */
 #define WORK_PATH_CHECKPOINT "/v1/work/checkpoint"
 #define WORK_PATH_PROGRESS   "/v1/work/progress"

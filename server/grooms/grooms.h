@@ -130,6 +130,27 @@ struct grooms_layer_edited {
 /* edited   the caller's, grooms_layer_edited_finish */
 GROOM_MUST_CHECK groom_status grooms_edit_layer(struct grooms *grooms, const struct grooms_layer_edit *edit,
                                                 struct grooms_layer_edited *edited, struct groom_diag *diag);
+/* The same for a worker: an edit as its job was given it. */
+struct grooms_layer_job {
+    const char *kind;    /* "sculpt" */
+    const char *inputs;  /* as grooms_layer_edited gave them */
+    const char *options;
+};
+/* The layer on its own, with its arrays: for a groom whose base are the strands below. */
+GROOM_MUST_CHECK groom_status grooms_job_layer(struct grooms *grooms, const struct grooms_layer_job *job, char **json,
+                                               struct groom_diag *diag);
+/* The strands that come into it, as HAIR in metres. */
+GROOM_MUST_CHECK groom_status grooms_job_strands(struct grooms *grooms, const struct grooms_layer_job *job,
+                                                 struct groom_sink sink, struct groom_diag *diag);
+/* What the worker made of it: a line of JSON {"report":{…},"contact":{…}}, and behind it the strands as HAIR.
+ * store    stores the revision and the answer
+ * returns  GROOM_EINVAL also where the groom was changed meanwhile */
+GROOM_MUST_CHECK groom_status grooms_job_result(struct grooms *grooms, const struct grooms_layer_job *job,
+                                                const char *bytes, size_t n_bytes,
+                                                groom_status (*store)(void *user, const struct store_revision_new *next,
+                                                                      uint32_t expected, const char *answer,
+                                                                      struct groom_diag *diag),
+                                                void *user, struct groom_diag *diag);
 void grooms_layer_edited_finish(struct grooms_layer_edited *edited); /* takes zeroed */
 
 /* --- what is evaluated -------------------------------------------------------------------------- */

@@ -17,26 +17,6 @@ static double now_s(void)
 
 /* --- the body --------------------------------------------------------------------------- */
 
-/* One under way. */
-struct trial {
-    struct grooms *grooms;
-    const struct grooms_layer_edit *edit;
-    struct groom_diag *diag;
-    cJSON *body;          /* the layer's members; what belongs to the wish is taken out */
-    cJSON *control;       /* ... and is here */
-    struct wish wish;
-    struct subject subject;
-    struct groom work;    /* borrows the subject's, with the layer at `index` */
-    uint32_t index;
-    bool borrowed, replaced;
-    struct state *before;
-    struct groom_layer_input *input;
-    struct groom_strands *after;
-    struct groom_layer_report report;
-    struct head *head;
-    double started_s;
-};
-
 static groom_status refuse(struct trial *trial, const char *pointer, const char *what)
 {
     return groom_fail_field(trial->diag, GROOM_EINVAL, pointer, "%s", what);
@@ -148,6 +128,9 @@ static cJSON *merge(struct trial *trial)
     const cJSON *chain = cJSON_GetObjectItemCaseSensitive(trial->subject.edit.document, "operators");
     cJSON *node = trial->replaced ? cJSON_Duplicate(cJSON_GetArrayItem(chain, (int)trial->index), 1) : cJSON_CreateObject();
     cJSON_DeleteItemFromObjectCaseSensitive(node, "contact");
+    cJSON_DeleteItemFromObjectCaseSensitive(trial->body, "contact"); /* is found, not told */
+    if (trial->contact)
+        cJSON_AddItemToObject(node, "contact", cJSON_Duplicate(trial->contact, 1));
     cJSON_DeleteItemFromObjectCaseSensitive(node, "type");
     cJSON_AddStringToObject(node, "type", groom_operator_name(trial->edit->type));
     while (trial->body->child) {
@@ -263,15 +246,15 @@ static groom_status keep_after(struct trial *trial, const char *node)
 
 static groom_status answer(struct trial *trial, struct grooms_layer_edited *edited)
 {
-    uint32_t n = 0;
-    const uint32_t *strands = groom_layer_input_strands(trial->input, &n);
+    uint32_t n = trial->report.n_strands;
+    const uint32_t *strands = trial->input ? groom_layer_input_strands(trial->input, &n) : NULL;
     const struct layer_answer reply = {.groom_id = edited->groom_id[0] ? edited->groom_id : NULL,
                                        .revision = edited->revision,
                                        .index = trial->index,
                                        .layer = trial->work.operators[trial->index].id,
                                        .type = trial->edit->type,
                                        .committed = trial->wish.commit,
-                                       .has_head = trial->head != NULL,
+                                       .has_head = trial->head != NULL || trial->report.contact.n_checked > 0,
                                        .seconds = now_s() - trial->started_s,
                                        .report = &trial->report,
                                        .after = trial->after,
@@ -282,37 +265,63 @@ static groom_status answer(struct trial *trial, struct grooms_layer_edited *edit
     return edited->json ? GROOM_OK : groom_fail(trial->diag, GROOM_ENOMEM, "no memory for the answer");
 }
 
-static groom_status finish(struct trial *trial, struct grooms_layer_edited *edited)
+groom_status trial_finish(struct trial *trial, trial_store store, void *user, struct grooms_layer_edited *edited)
 {
-    char *node = NULL;
+    struct written written = {0};
     groom_status status = GROOM_OK;
     edited->end = trial->wish.commit ? GROOMS_EDITED : GROOMS_TRIED;
-    if (trial->wish.commit) {
-        status = subject_commit(&trial->subject, &trial->work, trial->index, trial->replaced, trial->edit, edited->groom_id,
-                                &edited->revision, &node, trial->diag);
-    } else if (trial->subject.editing) {
+    if (trial->subject.editing) {
         strncpy(edited->groom_id, trial->edit->groom_id, sizeof edited->groom_id - 1);
-        edited->revision = trial->subject.edit.expected;
+        edited->revision = trial->subject.edit.expected + trial->wish.commit;
+    }
+    if (trial->wish.commit) {
+        status = subject_write(&trial->subject, &trial->work, trial->index, trial->replaced, trial->edit, &written,
+                               trial->diag);
+        if (status == GROOM_OK && !trial->subject.editing) {
+            strncpy(edited->groom_id, written.next.groom_id, sizeof edited->groom_id - 1);
+            edited->revision = 1;
+        }
     }
     if (status == GROOM_OK)
         status = answer(trial, edited);
     if (status == GROOM_OK && trial->wish.commit)
-        status = keep_after(trial, node);
-    cJSON_free(node);
+        status = store(user, &written.next, written.expected, edited->json, trial->diag);
+    if (status == GROOM_OK && trial->wish.commit)
+        status = keep_after(trial, written.node);
+    written_finish(&written);
     return status;
 }
 
 /* --- too many for now -------------------------------------------------------------------------------- */
 
+/* What a job is to be given: the body as it came, and what it is for, at this revision. */
 static groom_status hand_over(struct trial *trial, struct grooms_layer_edited *edited)
 {
-    (void)edited;
-    return groom_fail(trial->diag, GROOM_ETOOBIG, "more than %d strands", GROOMS_EDIT_MOST_NOW);
+    cJSON *inputs = cJSON_CreateObject();
+    if (!trial->wish.commit) {
+        cJSON_Delete(inputs);
+        return groom_fail_field(trial->diag, GROOM_EINVAL, "/commit",
+                                "%u strands are edited; at most %d can be tried on: more are a job's work",
+                                edited->n_strands, GROOMS_EDIT_MOST_NOW);
+    }
+    edited->end = GROOMS_TOO_MANY;
+    if (trial->subject.editing) {
+        cJSON_AddStringToObject(inputs, "groom", trial->edit->groom_id);
+        cJSON_AddNumberToObject(inputs, "revision", trial->subject.edit.expected);
+    } else {
+        cJSON_AddStringToObject(inputs, "strands", trial->edit->strands_id);
+    }
+    if (*trial->subject.head && trial->wish.avoid_head)
+        cJSON_AddStringToObject(inputs, "head", trial->subject.head);
+    edited->inputs = cJSON_PrintUnformatted(inputs);
+    edited->json = strndup(trial->edit->body, trial->edit->n_body);
+    cJSON_Delete(inputs);
+    return edited->inputs && edited->json ? GROOM_OK : groom_fail(trial->diag, GROOM_ENOMEM, "no memory for a job");
 }
 
 /* --- the edit ------------------------------------------------------------------------------------------ */
 
-static void trial_end(struct trial *trial)
+void trial_end(struct trial *trial)
 {
     if (trial->before && trial->input)
         states_give_input(trial->grooms->states, trial->before, trial->input);
@@ -326,27 +335,46 @@ static void trial_end(struct trial *trial)
     cJSON_Delete(trial->control);
 }
 
+groom_status trial_begin(struct trial *trial)
+{
+    groom_status status;
+    trial->started_s = now_s();
+    if ((status = parse_body(trial)) != GROOM_OK ||
+        (status = subject_open(trial->grooms, trial->edit, &trial->wish, &trial->subject, trial->diag)) != GROOM_OK ||
+        (status = read_layer(trial)) != GROOM_OK)
+        return status;
+    return take_before(trial);
+}
+
+static groom_status store_now(void *user, const struct store_revision_new *next, uint32_t expected, const char *answer,
+                              struct groom_diag *diag)
+{
+    struct trial *trial = user;
+    (void)answer;
+    return expected ? store_revision_add(trial->grooms->options.store, next, expected, diag)
+                    : store_groom_create(trial->grooms->options.store, next, diag);
+}
+
 static groom_status run(struct trial *trial, struct grooms_layer_edited *edited)
 {
     uint32_t n = 0;
-    groom_status status;
-    if ((status = parse_body(trial)) != GROOM_OK ||
-        (status = subject_open(trial->grooms, trial->edit, &trial->wish, &trial->subject, trial->diag)) != GROOM_OK ||
-        (status = read_layer(trial)) != GROOM_OK || (status = take_before(trial)) != GROOM_OK)
+    groom_status status = trial_begin(trial);
+    if (status != GROOM_OK)
         return status;
     status = groom_layer_count(&trial->work, trial->index, trial->before->strands, &trial->grooms->context, &n, trial->diag);
     if (status != GROOM_OK)
         return shorten(trial, status);
+    edited->n_strands = n;
     if (n > GROOMS_EDIT_MOST_NOW)
         return hand_over(trial, edited);
     status = apply(trial);
-    return status == GROOM_OK ? finish(trial, edited) : status;
+    return status == GROOM_OK ? trial_finish(trial, store_now, trial, edited) : status;
 }
 
 groom_status grooms_edit_layer(struct grooms *grooms, const struct grooms_layer_edit *edit,
                                struct grooms_layer_edited *out, struct groom_diag *diag)
 {
-    struct trial trial = {.grooms = grooms, .edit = edit, .diag = diag, .started_s = now_s()};
+    struct trial trial = {.grooms = grooms, .edit = edit, .diag = diag};
     struct grooms_layer_edited edited = {0};
     groom_status status = run(&trial, &edited);
     trial_end(&trial);

@@ -36,12 +36,20 @@ void subject_close(struct subject *subject);
 groom_status subject_target(const struct subject *subject, const struct wish *wish, struct groom *groom, uint32_t index,
                             struct groom_diag *diag);
 
-/* Write the chain with its new layer at `index` as a revision, or as a new groom. `replaced`: one of this place
- * was there before.
- * node     the layer as it now stands in the document, for the key behind it; malloc'ed */
-groom_status subject_commit(struct subject *subject, const struct groom *groom, uint32_t index, bool replaced,
-                            const struct grooms_layer_edit *edit, char groom_id[STORE_ID_SIZE], uint32_t *revision,
-                            char **node, struct groom_diag *diag);
+/* What is to be stored: the chain with its new layer, as a revision or as a new groom. */
+struct written {
+    struct store_revision_new next;
+    uint32_t expected;               /* 0: a new groom */
+    char *node;                      /* the layer as it stands in the document; NULL: subject->keys[1] tells the key */
+    char *text;
+    struct store_array *list;
+    struct grooms_prepared prepared;
+};
+
+/* `replaced`: a layer stood at `index` before. */
+groom_status subject_write(struct subject *subject, const struct groom *groom, uint32_t index, bool replaced,
+                           const struct grooms_layer_edit *edit, struct written *written, struct groom_diag *diag);
+void written_finish(struct written *written); /* takes zeroed */
 
 /* The answer: what was done, and the strands that the layer looked at where they are wanted. */
 struct layer_answer {
@@ -57,5 +65,38 @@ struct layer_answer {
 };
 /* malloc'ed; NULL: no memory */
 char *layer_answer_text(const struct layer_answer *answer);
+
+/* --- one edit (layer_edit.c) ------------------------------------------------------------- */
+
+/* One under way. */
+struct trial {
+    struct grooms *grooms;
+    const struct grooms_layer_edit *edit;
+    struct groom_diag *diag;
+    cJSON *body;          /* the layer's members; what belongs to the wish is taken out */
+    cJSON *control;       /* ... and is here */
+    const cJSON *contact; /* sculpt: what a worker has found, or NULL */
+    struct wish wish;
+    struct subject subject;
+    struct groom work;    /* borrows the subject's, with the layer at `index` */
+    uint32_t index;
+    bool borrowed, replaced;
+    struct state *before;
+    struct groom_layer_input *input;
+    struct groom_strands *after;
+    struct groom_layer_report report;
+    struct head *head;
+    double started_s;
+};
+
+/* Read the body, open what it edits, read the layer, and have the strands that come into it. */
+groom_status trial_begin(struct trial *trial);
+void trial_end(struct trial *trial); /* also where trial_begin has failed */
+
+/* How a revision is stored: now, or with the end of a job. */
+typedef groom_status (*trial_store)(void *user, const struct store_revision_new *next, uint32_t expected,
+                                    const char *answer, struct groom_diag *diag);
+/* With `after` and `report` in the trial. */
+groom_status trial_finish(struct trial *trial, trial_store store, void *user, struct grooms_layer_edited *edited);
 
 #endif

@@ -166,28 +166,19 @@ static groom_status write_node(struct subject *subject, const struct groom *groo
     return status;
 }
 
-static groom_status commit_revision(struct subject *subject, const struct groom *groom, uint32_t index, bool replaced,
-                                    uint32_t *revision, char **node, struct groom_diag *diag)
+static groom_status write_revision(struct subject *subject, const struct groom *groom, uint32_t index, bool replaced,
+                                   struct written *written, struct groom_diag *diag)
 {
     cJSON *tree = NULL, *chain = cJSON_GetObjectItemCaseSensitive(subject->edit.document, "operators");
-    struct store_revision_new next;
-    struct store_array *list = NULL;
-    char *text = NULL;
-    groom_status status = write_node(subject, groom, index, &tree, node, diag);
+    groom_status status = write_node(subject, groom, index, &tree, &written->node, diag);
     if (status != GROOM_OK)
         return status;
     if (replaced ? !cJSON_ReplaceItemInArray(chain, (int)index, tree) : !cJSON_AddItemToArray(chain, tree)) {
         cJSON_Delete(tree);
         return groom_fail(diag, GROOM_ENOMEM, "no memory for a layer");
     }
-    status = edit_prepare_tree(&subject->edit, &text, &list, &next);
-    if (status == GROOM_OK)
-        status = store_revision_add(subject->grooms->options.store, &next, subject->edit.expected, diag);
-    if (status == GROOM_OK)
-        *revision = subject->edit.expected + 1;
-    cJSON_free(text);
-    free(list);
-    return status;
+    written->expected = subject->edit.expected;
+    return edit_prepare_tree(&subject->edit, &written->text, &written->list, &written->next);
 }
 
 /* Of a new groom only its document tells under which key its strands are found. */
@@ -205,31 +196,30 @@ static groom_status note_keys(struct subject *subject, const char *document, str
     return status;
 }
 
-static groom_status commit_groom(struct subject *subject, const struct groom *groom, const struct grooms_layer_edit *edit,
-                                 char groom_id[STORE_ID_SIZE], struct groom_diag *diag)
+static groom_status write_new(struct subject *subject, const struct groom *groom, const struct grooms_layer_edit *edit,
+                              struct written *written, struct groom_diag *diag)
 {
     const struct grooms_source source = {.strands = edit->strands_id, .head = *subject->head ? subject->head : NULL,
                                          .note = groom_operator_name(edit->type)};
-    struct grooms_prepared prepared = {0};
-    groom_status status = prepare_groom(subject->grooms, groom, "{}", 2, &source, &prepared, diag);
-    if (status == GROOM_OK)
-        status = store_groom_create(subject->grooms->options.store, &prepared.revision, diag);
-    if (status == GROOM_OK) {
-        memcpy(groom_id, prepared.groom_id, STORE_ID_SIZE);
-        status = note_keys(subject, prepared.revision.document, diag);
-    }
-    grooms_prepared_finish(&prepared);
-    return status;
+    groom_status status = prepare_groom(subject->grooms, groom, "{}", 2, &source, &written->prepared, diag);
+    if (status != GROOM_OK)
+        return status;
+    written->next = written->prepared.revision;
+    written->next.groom_id = written->prepared.groom_id;
+    return note_keys(subject, written->next.document, diag);
 }
 
-groom_status subject_commit(struct subject *subject, const struct groom *groom, uint32_t index, bool replaced,
-                            const struct grooms_layer_edit *edit, char groom_id[STORE_ID_SIZE], uint32_t *revision,
-                            char **node, struct groom_diag *diag)
+groom_status subject_write(struct subject *subject, const struct groom *groom, uint32_t index, bool replaced,
+                           const struct grooms_layer_edit *edit, struct written *written, struct groom_diag *diag)
 {
-    if (subject->editing) {
-        strncpy(groom_id, subject->edit.groom_id, STORE_ID_SIZE - 1);
-        return commit_revision(subject, groom, index, replaced, revision, node, diag);
-    }
-    *revision = 1;
-    return commit_groom(subject, groom, edit, groom_id, diag);
+    return subject->editing ? write_revision(subject, groom, index, replaced, written, diag)
+                            : write_new(subject, groom, edit, written, diag);
+}
+
+void written_finish(struct written *written)
+{
+    cJSON_free(written->node);
+    cJSON_free(written->text);
+    free(written->list);
+    grooms_prepared_finish(&written->prepared);
 }

@@ -85,6 +85,8 @@ void grooms_call_revert(struct request *request);
 void grooms_call_preview(struct request *request);
 
 /* layer_calls.c */
+void work_call_layer(struct request *request);
+void work_call_strands(struct request *request);
 void layers_call_ruffle(struct request *request);
 void layers_call_sculpt(struct request *request);
 void layers_call_interpolate(struct request *request);

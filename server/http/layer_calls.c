@@ -7,6 +7,7 @@
 #include "server/grooms/grooms.h"
 #include "server/http/handlers.h"
 #include "server/http/server.h"
+#include "server/jobs/jobs.h"
 
 /* Larger ones are refused before they are looked at: 5 million anchors. */
 #define MOST_BODY ((uint64_t)128 << 20)
@@ -33,6 +34,24 @@ static void respond_edited(struct request *request, struct grooms_layer_edited *
     }
 }
 
+/* More strands than may be edited now: a job of their own. */
+static void submit(struct request *request, const struct grooms_layer_edit *wanted, const struct grooms_layer_edited *edited)
+{
+    struct store_job job = {0};
+    struct groom_diag diag = {0};
+    bool created;
+    const struct jobs_request submission = {.kind = groom_operator_name(wanted->type), .inputs = edited->inputs,
+                                            .options = edited->json};
+    groom_status status = jobs_submit(request->service->jobs, &submission, &job, &created, &diag);
+    if (status != GROOM_OK) {
+        respond_failure(request, status, &diag);
+        return;
+    }
+    respond_json(request, 202, jobs_json(&job));
+    respond_header(request, "Location", "/v1/jobs/%s", job.id);
+    store_job_finish(&job);
+}
+
 static void edit(struct request *request, struct grooms_layer_edit *wanted)
 {
     struct grooms_layer_edited edited = {0};
@@ -42,6 +61,8 @@ static void edit(struct request *request, struct grooms_layer_edit *wanted)
         respond_refusal(request, 412, "precondition-failed", "it was changed meanwhile", "%s", diag.detail);
     else if (status != GROOM_OK)
         respond_failure(request, status, &diag);
+    else if (edited.end == GROOMS_TOO_MANY)
+        submit(request, wanted, &edited);
     else
         respond_edited(request, &edited);
     grooms_layer_edited_finish(&edited);

@@ -11,6 +11,7 @@
 #include "server/blobs/blobs.h"
 #include "server/grooms/grooms.h"
 #include "server/http/handlers.h"
+#include "server/http/tool.h"
 #include "server/jobs/work.h"
 
 static void respond_done(struct request *request, groom_status status, const struct groom_diag *diag)
@@ -131,6 +132,98 @@ static groom_status take_result(struct request *request, const char *document, s
     return status;
 }
 
+/* --- edits ----------------------------------------------------------------------------------- */
+
+/* The attempt's job where that is an edit; false where it was refused (and answered). */
+static bool take_edit(struct request *request, struct store_job *job, struct grooms_layer_job *edit)
+{
+    struct groom_diag diag = {0};
+    groom_status status = jobs_get(request->service->jobs, request->attempt.job_id, job, &diag);
+    if (status == GROOM_OK && !strcmp(job->kind, "fit")) {
+        status = groom_fail(&diag, GROOM_ENOTFOUND, "this job is a fit: it has no layer");
+        store_job_finish(job);
+    }
+    if (status != GROOM_OK) {
+        respond_failure(request, status, &diag);
+        return false;
+    }
+    *edit = (struct grooms_layer_job){job->kind, job->request, job->options};
+    return true;
+}
+
+void work_call_layer(struct request *request)
+{
+    struct store_job job = {0};
+    struct grooms_layer_job edit;
+    struct groom_diag diag = {0};
+    char *json;
+    if (!take_edit(request, &job, &edit))
+        return;
+    groom_status status = grooms_job_layer(request->service->grooms, &edit, &json, &diag);
+    if (status != GROOM_OK)
+        respond_failure(request, status, &diag);
+    else
+        respond_bytes(request, 200, "application/json", json, strlen(json));
+    store_job_finish(&job);
+}
+
+static groom_status write_strands(struct request *request, const struct grooms_layer_job *edit, int fd, uint64_t *n_bytes,
+                                  struct groom_diag *diag)
+{
+    struct tool_sink *sink = malloc(sizeof *sink);
+    if (!sink)
+        return GROOM_ENOMEM;
+    groom_status status = grooms_job_strands(request->service->grooms, edit, tool_sink(sink, fd), diag);
+    if (status == GROOM_OK)
+        status = tool_flush(sink);
+    *n_bytes = sink->n_written;
+    free(sink);
+    return status;
+}
+
+void work_call_strands(struct request *request)
+{
+    struct store_job job = {0};
+    struct grooms_layer_job edit;
+    struct groom_diag diag = {0};
+    uint64_t n_bytes = 0;
+    int fd;
+    if (!take_edit(request, &job, &edit))
+        return;
+    if ((fd = tool_temporary(request)) >= 0) {
+        groom_status status = write_strands(request, &edit, fd, &n_bytes, &diag);
+        if (status == GROOM_OK) {
+            respond_file(request, "application/octet-stream", fd, n_bytes);
+        } else {
+            close(fd);
+            respond_failure(request, status, &diag);
+        }
+    }
+    store_job_finish(&job);
+}
+
+static groom_status store_edited(void *user, const struct store_revision_new *next, uint32_t expected, const char *answer,
+                                 struct groom_diag *diag)
+{
+    struct request *request = user;
+    return work_edited(request->service->jobs, &request->attempt, next, expected, answer, diag);
+}
+
+/* A fit hands in a document, an edit the strands that it has made. */
+static groom_status take_any(struct request *request, const char *bytes, size_t n_bytes, struct groom_diag *diag)
+{
+    struct store_job job = {0};
+    groom_status status = jobs_get(request->service->jobs, request->attempt.job_id, &job, diag);
+    if (status != GROOM_OK)
+        return status;
+    const struct grooms_layer_job edit = {job.kind, job.request, job.options};
+    status = strcmp(job.kind, "fit")
+                 ? grooms_job_result(request->service->grooms, &edit, bytes, n_bytes, store_edited, request, diag)
+                 : take_result(request, bytes, n_bytes, diag);
+    store_job_finish(&job);
+    return status;
+}
+
 void work_call_result(struct request *request)
 {
     struct groom_diag diag = {0};
@@ -144,7 +237,7 @@ void work_call_result(struct request *request)
         respond_failure(request, GROOM_EIO, NULL);
         return;
     }
-    groom_status status = take_result(request, document, n_bytes, &diag);
+    groom_status status = take_any(request, document, n_bytes, &diag);
     munmap(document, n_bytes);
     respond_done(request, status, &diag);
 }

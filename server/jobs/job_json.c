@@ -4,6 +4,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "groom/document.h"
 #include "server/jobs/queue.h"
 
 static void add_time(cJSON *object, const char *name, int64_t time_ms)
@@ -22,6 +23,18 @@ static void add_text(cJSON *object, const char *name, const char *text)
 {
     cJSON *item = text ? cJSON_Parse(text) : NULL;
     cJSON_AddItemToObject(object, name, item ? item : cJSON_CreateNull());
+}
+
+/* An edit's options are its body, whose arrays may be megabytes: what they are is told, not what is in them. */
+static void add_options(cJSON *object, const char *options)
+{
+    char *text = NULL;
+    size_t n_bytes;
+    if (strstr(options, "\"dtype\"") && groom_document_outline(options, strlen(options), &text, &n_bytes, NULL) == GROOM_OK)
+        add_text(object, "options", text);
+    else
+        add_text(object, "options", options);
+    free(text);
 }
 
 /* The ids that the job was made with stand beside its own: "strands", "head". */
@@ -73,7 +86,7 @@ cJSON *jobs_json(const struct store_job *job)
     cJSON_AddNumberToObject(object, "attempt", job->attempt);
     cJSON_AddBoolToObject(object, "cancel_requested", job->cancel_requested);
     add_text(object, "loss", job->loss);
-    add_text(object, "options", job->options);
+    add_options(object, job->options);
     add_text(object, "result", job->result);
     add_text(object, "error", job->error);
     add_time(object, "created_at", job->created_ms);

@@ -214,6 +214,15 @@ groom_status work_checkpoint(struct jobs *jobs, const struct store_attempt_ref *
     return status;
 }
 
+groom_status work_edited(struct jobs *jobs, const struct store_attempt_ref *ref, const struct store_revision_new *groom,
+                         uint32_t expected, const char *result, struct groom_diag *diag)
+{
+    struct store_job_move move = {.job_id = ref->job_id, .from = STORE_JOB_RUNNING, .to = STORE_JOB_SUCCEEDED,
+                                  .attempt = ref->number, .attempt_state = STORE_ATTEMPT_SUCCEEDED,
+                                  .result = result, .groom = groom, .groom_expected = expected};
+    return jobs_move(jobs, &move, diag);
+}
+
 groom_status work_result(struct jobs *jobs, const struct store_attempt_ref *ref,
                          const struct store_revision_new *groom, struct groom_diag *diag)
 {

@@ -62,6 +62,11 @@ GROOM_MUST_CHECK groom_status work_checkpoint(struct jobs *jobs, const struct st
  * returns  GROOM_ECONFLICT, GROOM_ECANCELLED, and what store_groom_create returns */
 GROOM_MUST_CHECK groom_status work_result(struct jobs *jobs, const struct store_attempt_ref *ref,
                                           const struct store_revision_new *groom, struct groom_diag *diag);
+/* The same of an edit: its result is this JSON object, and `groom` the revision after `expected`, or a new
+ * groom where that is 0. */
+GROOM_MUST_CHECK groom_status work_edited(struct jobs *jobs, const struct store_attempt_ref *ref,
+                                          const struct store_revision_new *groom, uint32_t expected, const char *result,
+                                          struct groom_diag *diag);
 /* The job has failed for good with this problem object (JSON). returns  GROOM_EINVAL, GROOM_ECONFLICT,
  *          GROOM_ECANCELLED (it was told to stop: it has only to exit) */
 GROOM_MUST_CHECK groom_status work_failed(struct jobs *jobs, const struct store_attempt_ref *ref,

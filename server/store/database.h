@@ -120,6 +120,8 @@ void database_close_copy(struct store *store);
 
 /* --- parts of larger transactions ----------------------------------------------------------- */
 
+groom_status groom_add_revision(struct connection *c, const struct store_revision_new *revision,
+                                uint32_t expected_latest, struct groom_diag *diag);
 groom_status groom_insert(struct connection *c, const struct store_revision_new *revision, int64_t now,
                           struct groom_diag *diag);
 groom_status quality_insert(struct connection *c, const struct store_quality *key, const char *report, int64_t now,

@@ -117,8 +117,8 @@ static groom_status advance_groom(struct connection *c, const struct store_revis
     return query_run(&q, NULL);
 }
 
-static groom_status add_revision(struct connection *c, const struct store_revision_new *revision,
-                                 uint32_t expected_latest, struct groom_diag *diag)
+groom_status groom_add_revision(struct connection *c, const struct store_revision_new *revision,
+                                uint32_t expected_latest, struct groom_diag *diag)
 {
     uint32_t latest = 0;
     int64_t now = store_now_ms();
@@ -140,7 +140,7 @@ groom_status store_revision_add(struct store *store, const struct store_revision
     groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    return transaction_end(c, add_revision(c, revision, expected_latest, diag), diag);
+    return transaction_end(c, groom_add_revision(c, revision, expected_latest, diag), diag);
 }
 
 /* --- reading --------------------------------------------------------------------------- */

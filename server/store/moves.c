@@ -196,7 +196,8 @@ static groom_status write_move(struct connection *c, const struct store_job_move
     if (status == GROOM_OK && move->attempt != 0)
         status = end_attempt(c, move, now, diag);
     if (status == GROOM_OK && move->groom)
-        status = groom_insert(c, move->groom, now, diag);
+        status = move->groom_expected ? groom_add_revision(c, move->groom, move->groom_expected, diag)
+                                      : groom_insert(c, move->groom, now, diag);
     if (status == GROOM_OK)
         status = update_job(c, move, now, diag);
     if (status == GROOM_OK)

@@ -421,6 +421,7 @@ struct store_job_move {
     int64_t not_before_ms;                  /* back to queued: no earlier than this; 0: at once */
     const char *result, *error;             /* JSON objects for the end states, or NULL */
     const struct store_revision_new *groom; /* created in the same transaction, or NULL */
+    uint32_t groom_expected;                /* 0: it is a new one; else the latest revision of the one that it follows */
 };
 
 /* Move a job, end its attempt, write its groom and its `state` event: all or nothing. Into an end

@@ -14,6 +14,7 @@
 #include "proto/work.h"
 #include "server/worker/blob.h"
 #include "server/worker/checkpoint.h"
+#include "server/worker/edit_attempt.h"
 #include "server/worker/progress_report.h"
 #include "server/worker/worker.h"
 
@@ -38,6 +39,12 @@ struct attempt {
 
 /* --- what is needed ----------------------------------------------------------------------- */
 
+static int is_edit(const struct attempt *a)
+{
+    groom_operator_type type;
+    return groom_operator_parse(a->order.kind, &type, NULL) == GROOM_OK && groom_operator_is_layer(type);
+}
+
 static groom_status take_order(struct attempt *a)
 {
     struct http_response response;
@@ -46,9 +53,10 @@ static groom_status take_order(struct attempt *a)
     if (st == GROOM_OK)
         st = order_parse(response.body, response.n_body, &a->order, &a->diag);
     http_response_finish(&response);
-    if (st == GROOM_OK && strcmp(a->order.kind, "fit"))
+    if (st == GROOM_OK && strcmp(a->order.kind, "fit") && !is_edit(a))
         st = groom_fail_field(&a->diag, GROOM_EINVAL, "/kind",
-                              "this worker runs jobs of kind \"fit\", not \"%.15s\"", a->order.kind);
+                              "this worker runs fits and edits in curvature space, not jobs of kind \"%.15s\"",
+                              a->order.kind);
     return st;
 }
 
@@ -290,9 +298,17 @@ static void release(struct attempt *a)
     free(a);
 }
 
+static groom_status run_edit(struct attempt *a)
+{
+    groom_status st = take_input(a, &a->order.head, read_head);
+    return st == GROOM_OK ? edit_attempt(&a->link, a->head, &a->context, &a->report, &a->diag) : st;
+}
+
 static groom_status run(struct attempt *a)
 {
     groom_status st = take_order(a);
+    if (st == GROOM_OK && is_edit(a))
+        return run_edit(a);
     if (st == GROOM_OK)
         st = take_input(a, &a->order.strands, read_strands);
     if (st == GROOM_OK)

@@ -69,7 +69,9 @@ static groom_status parse_members(const cJSON *json, struct order *order, struct
     snprintf(order->job, sizeof order->job, "%s", text_of(json, "job"));
     snprintf(order->kind, sizeof order->kind, "%s", text_of(json, "kind"));
     order->attempt = (uint32_t)number_of(json, "attempt", 1);
-    st = parse_input(member(inputs, "strands"), "strands", &order->strands, diag);
+    st = GROOM_OK; /* an edit's strands come from the daemon, which evaluates what they are edited in */
+    if (!strcmp(order->kind, "fit") || cJSON_IsObject(member(inputs, "strands")))
+        st = parse_input(member(inputs, "strands"), "strands", &order->strands, diag);
     if (st == GROOM_OK && cJSON_IsObject(head))
         st = parse_input(head, "head", &order->head, diag);
     if (st == GROOM_OK && cJSON_IsObject(checkpoint))

@@ -27,12 +27,14 @@ static uint32_t n_fit_stages(void)
     return n;
 }
 
-static int stands_somewhere(const struct progress_report *report) { return report->fit || report->compared >= 0; }
+static int stands_somewhere(const struct progress_report *report) { return report->fit || report->plain.stage || report->compared >= 0; }
 
 /* Of all of the job. */
 static double fraction_of(const struct progress_report *report)
 {
     struct groom_fit_progress progress;
+    if (report->plain.stage)
+        return report->plain.fraction;
     if (!report->fit)
         return 1 - REPORT_SHARE * (1 - report->compared);
     groom_fit_progress(report->fit, &progress);
@@ -44,10 +46,12 @@ static void add_stage(cJSON *message, const struct progress_report *report)
     struct groom_fit_progress progress = {.stage = REPORT_STAGE, .index = n_fit_stages()};
     if (report->fit)
         groom_fit_progress(report->fit, &progress);
+    if (report->plain.stage)
+        progress = report->plain;
     cJSON *stage = cJSON_AddObjectToObject(message, "stage");
     cJSON_AddStringToObject(stage, "name", progress.stage);
     cJSON_AddNumberToObject(stage, "index", progress.index);
-    cJSON_AddNumberToObject(stage, "count", n_fit_stages() + 1);
+    cJSON_AddNumberToObject(stage, "count", report->plain.stage ? progress.count : n_fit_stages() + 1);
 }
 
 static void add_time_left(cJSON *message, const struct progress_report *report, double fraction, double now_s)
@@ -166,10 +170,24 @@ static void on_loss(void *user, const char *name, uint64_t iteration, double val
 static void on_report(void *user, double fraction)
 {
     struct progress_report *report = user;
+    if (report->plain.stage)
+        report->plain.fraction = report->plain_begin + fraction * (report->plain_end - report->plain_begin);
     if (report->compared < 0)
         return;
     report->compared = fmin(fmax(report->compared, (report->n_compared + fraction) / 2), 1);
     report->n_compared += fraction >= 1;
+}
+
+void progress_report_stage(struct progress_report *report, const char *stage, uint32_t index, uint32_t count, double begin,
+                           double end)
+{
+    if (!report->plain.stage)
+        report->started_s = clock_s();
+    report->plain.stage = stage;
+    report->plain.index = index;
+    report->plain.count = count;
+    report->plain.fraction = report->plain_begin = begin;
+    report->plain_end = end;
 }
 
 static int on_cancelled(void *user) { return progress_report_send(user, 0) != GROOM_OK; }

@@ -88,6 +88,13 @@ test('every operation answers as it is described', async (t) => {
       await expect(daemon, 201, 'POST', `${at}/${kind}`, { body });
   }
 
+  const many = (await expect(daemon, 201, 'POST', '/v1/strands', { body: hair(5001, 3) })).json;
+  const edit = (await expect(daemon, 202, 'POST', `/v1/strands/${many.id}/ruffle`, { body: {} })).json;
+  const third = await daemon.attempt();
+  await expect(daemon, 200, 'GET', '/v1/work/layer', { token: third });
+  await expect(daemon, 200, 'GET', '/v1/work/strands', { token: third });
+  await expect(daemon, 202, 'DELETE', `/v1/jobs/${edit.id}`);
+
   const other = (await expect(daemon, 201, 'POST', '/v1/grooms', { body: groom_document() })).json.groom;
   for (const path of [`grooms/${other}`, `strands/${strands.id}`, `heads/${head.id}`]) await expect(daemon, 204, 'DELETE', `/v1/${path}`);
 

@@ -2,7 +2,7 @@
 import test from 'node:test';
 import assert from 'node:assert/strict';
 import { startDaemon } from '../support/daemon.mjs';
-import { array, decode, expect, groom_document, hair, head_obj, refused } from '../support/api.mjs';
+import { array, decode, expect, groom_document, hair, head_obj, refused, startIdleDaemon } from '../support/api.mjs';
 
 const M = 40;
 /** Coils that hang from a disc: 3 turns of 8 mm. */
@@ -233,4 +233,58 @@ test('bad edits are refused at the culprit, and the groom stays', async (t) => {
   assert.equal(json.revision, 1);
   assert.equal(json.operators.length, 1);
   assert.deepEqual((await expect(daemon, 200, 'GET', '/v1/grooms')).json.grooms.length, 1);
+});
+
+test('more than 5 000 strands are a job', async (t) => {
+  const daemon = await startDaemon(t);
+  const n = 5200, str = await upload(daemon, n), shapes = coils(n);
+  const anchors = { strand: array('u32', [n], shapes.map((_, i) => i)), at: array('f32', [n], new Array(n).fill(1)),
+    position: array('f32', [n, 3], shapes.flatMap((s) => [s[M - 1][0] + 0.01, s[M - 1][1], s[M - 1][2]])) };
+  const wait = async (job) => (await expect(daemon, 200, 'GET', `/v1/jobs/${job}`, { headers: { Prefer: 'wait=60' } })).json;
+  const asked = await edit(daemon, 202, str, 'sculpt', { anchors, elements: 12, stiffness: 0.1 });
+  assert.equal(asked.json.kind, 'sculpt');
+  assert.equal(asked.json.strands, str);
+  assert.equal(asked.json.options.anchors.position.data, undefined);
+  assert.equal(asked.headers.get('location'), `/v1/jobs/${asked.json.id}`);
+  const done = await wait(asked.json.id);
+  assert.equal(done.state, 'succeeded', JSON.stringify(done.error));
+  const { groom, revision, energy, anchor_error, strands } = done.result;
+  assert.deepEqual([revision, strands.changed], [1, n]);
+  assert.ok(energy.after < energy.before && anchor_error.max < 0.01);
+
+  await t.test('its result is what the chain evaluates to', async () => {
+    const other = await startDaemon(t);
+    const document = (await expect(daemon, 200, 'GET', `/v1/grooms/${groom}`)).json;
+    const copy = (await expect(other, 201, 'POST', '/v1/grooms', { body: document })).json.groom;
+    assert.deepEqual(await strands_of(other, copy), await strands_of(daemon, groom));
+  });
+  await t.test('of a groom, at the revision that it was asked for', async () => {
+    const ruffle = (await edit(daemon, 202, groom, 'ruffle', { rho: 0.3 })).json;
+    assert.deepEqual([ruffle.groom, ruffle.revision], [groom, 1]);
+    const after = await wait(ruffle.id);
+    assert.equal(after.state, 'succeeded', JSON.stringify(after.error));
+    assert.deepEqual([after.result.groom, after.result.revision], [groom, 2]);
+    assert.deepEqual((await expect(daemon, 200, 'GET', `/v1/grooms/${groom}?arrays=false`)).json.operators.map(({ type }) => type), ['sculpt', 'ruffle']);
+  });
+  await refused(daemon, 400, 'invalid-argument', 'POST', `/v1/grooms/${groom}/ruffle`, { body: { commit: false }, problem: { pointer: '/commit' } });
+  await refused(daemon, 400, 'invalid-argument', 'POST', `/v1/grooms/${groom}/ruffle`, { body: { rho: 2 }, problem: { pointer: '/rho' } });
+});
+
+test('an edit whose groom is changed while it waits fails, and says so', async (t) => {
+  const daemon = await startIdleDaemon(t);
+  const n = 5001, str = await upload(daemon, n);
+  const one = [{ strand: 0, at: 1, position: [0, 1.55, 0] }];
+  const { json } = await edit(daemon, 201, str, 'sculpt', { anchors: one });
+  const job = (await edit(daemon, 202, json.groom, 'ruffle', {})).json;
+  const token = await daemon.attempt();
+  const layer = (await expect(daemon, 200, 'GET', '/v1/work/layer', { token })).json;
+  assert.equal(layer.type, 'ruffle');
+  assert.equal((await expect(daemon, 200, 'GET', '/v1/work/strands', { token })).bytes.toString('latin1', 0, 4), 'HAIR');
+  await edit(daemon, 201, json.groom, 'sculpt', { layer: json.layer, anchors: one });
+  const { detail } = (await expect(daemon, 400, 'GET', '/v1/work/layer', { token })).json;
+  assert.match(detail, /changed/);
+  await expect(daemon, 400, 'POST', '/v1/work/result', { token, body: '{"report":{}}\nHAIR' });
+  await expect(daemon, 400, 'POST', '/v1/work/result', { token, body: 'nothing' });
+  await expect(daemon, 204, 'POST', '/v1/work/failed', { token, body: { type: '/problems/invalid-argument', title: 'x', status: 400, detail } });
+  assert.equal((await expect(daemon, 200, 'GET', `/v1/jobs/${job.id}`)).json.state, 'failed');
 });

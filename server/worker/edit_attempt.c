@@ -1,0 +1,203 @@
+#include "server/worker/edit_attempt.h"
+
+#include <cjson/cJSON.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "groom/document.h"
+#include "groom/format.h"
+#include "groom/layers.h"
+#include "groom/spatial.h"
+#include "proto/work.h"
+#include "server/worker/clock.h"
+#include "server/worker/worker.h"
+
+struct edit {
+    struct work_link *link;
+    const struct groom_context *context;
+    struct progress_report *progress;
+    struct groom_diag *diag;
+    struct groom_strands *before, *after;
+    struct groom *groom;             /* of the strands, with the layer alone */
+    struct groom_bvh *head;
+    struct groom_layer_input *input;
+    struct groom_layer_report report;
+    double started_s;
+};
+
+/* --- what is needed ------------------------------------------------------------------------ */
+
+struct reception {
+    int fd, failed;
+};
+
+static void begin(void *user)
+{
+    struct reception *r = user;
+    r->failed = ftruncate(r->fd, 0) != 0 || lseek(r->fd, 0, SEEK_SET) != 0;
+}
+
+static size_t receive(void *user, const char *bytes, size_t n)
+{
+    struct reception *r = user;
+    size_t done = 0;
+    while (!r->failed && done < n) {
+        ssize_t written = write(r->fd, bytes + done, n - done);
+        if (written < 0 && errno != EINTR)
+            return 0;
+        done += written > 0 ? (size_t)written : 0;
+    }
+    return r->failed ? 0 : n;
+}
+
+static groom_status take_strands(struct edit *e)
+{
+    struct reception reception = {.fd = memfd_create("strands", MFD_CLOEXEC)};
+    const struct groom_read_options options = {.format = GROOM_FORMAT_HAIR};
+    const struct http_request request = {.method = "GET", .path = WORK_PATH_STRANDS, .sink = receive, .begin = begin,
+                                         .user = &reception};
+    if (reception.fd < 0)
+        return groom_fail(e->diag, GROOM_ENOMEM, "no memory for the strands");
+    groom_status st = work_link_call(e->link, &request, NULL, e->diag);
+    if (st == GROOM_OK && (lseek(reception.fd, 0, SEEK_SET) != 0 || reception.failed))
+        st = groom_fail(e->diag, GROOM_EIO, "the strands could not be kept");
+    if (st == GROOM_OK) {
+        struct worker_input input;
+        worker_input_open(reception.fd, &input);
+        st = groom_strands_read(&input.source, &options, e->context, &e->before, NULL, e->diag);
+        worker_input_close(&input);
+    }
+    close(reception.fd);
+    return st == GROOM_OK ? groom_create_of_strands(e->before, e->context, &e->groom, e->diag) : st;
+}
+
+static groom_status take_layer(struct edit *e)
+{
+    struct http_response response;
+    groom_status st = work_link_call(e->link, &(struct http_request){.method = "GET", .path = WORK_PATH_LAYER}, &response,
+                                     e->diag);
+    if (st == GROOM_OK)
+        st = groom_document_operator_read(response.body, response.n_body, NULL, e->groom, 0, e->diag);
+    http_response_finish(&response);
+    return st;
+}
+
+/* --- the work ---------------------------------------------------------------------------------- */
+
+static groom_status solve(struct edit *e)
+{
+    progress_report_stage(e->progress, "convert", 0, 2, 0.0, 0.5);
+    groom_status st = progress_report_send(e->progress, 1);
+    if (st == GROOM_OK)
+        st = groom_layer_input_create(e->groom, 0, e->before, e->context, &e->input, e->diag);
+    progress_report_stage(e->progress, "solve", 1, 2, 0.5, 1.0);
+    if (st == GROOM_OK)
+        st = progress_report_send(e->progress, 1);
+    if (st != GROOM_OK)
+        return st;
+    return e->head ? groom_layer_apply_outside(e->groom, 0, e->before, e->input, e->head, e->context, &e->after, &e->report,
+                                               e->diag)
+                   : groom_layer_apply(e->groom, 0, e->before, e->input, e->context, &e->after, &e->report, e->diag);
+}
+
+/* --- the result ----------------------------------------------------------------------------------- */
+
+static cJSON *describe(const struct edit *e)
+{
+    const struct groom_layer_report *r = &e->report;
+    const struct {
+        const char *name;
+        double value;
+    } rows[] = {{"strands", r->n_strands}, {"changed", r->n_changed}, {"conversion_error", (double)r->conversion_error_m},
+                {"seconds", clock_s() - e->started_s}, {"energy_before", r->sculpt.energy_before},
+                {"energy_after", r->sculpt.energy_after}, {"anchors", r->sculpt.n_anchors},
+                {"anchor_error_mean", r->sculpt.anchor_error_mean_m}, {"anchor_error_max", r->sculpt.anchor_error_max_m},
+                {"iterations_median", r->sculpt.iterations_median}, {"iterations_max", r->sculpt.iterations_max},
+                {"unfinished", r->sculpt.n_stopped}, {"contact_checked", r->contact.n_checked},
+                {"contact_entered", r->contact.n_entered}, {"contact_inside", r->contact.n_inside},
+                {"contact_depth_before", (double)r->contact.depth_before_m},
+                {"contact_depth_after", (double)r->contact.depth_after_m}};
+    cJSON *root = cJSON_CreateObject(), *report = cJSON_AddObjectToObject(root, "report");
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
+        cJSON_AddNumberToObject(report, rows[i].name, rows[i].value);
+    return root;
+}
+
+/* What was found of contact stands in the layer now, as the document will have it. */
+static groom_status add_contact(const struct edit *e, cJSON *root)
+{
+    char *text = NULL;
+    size_t n_bytes;
+    groom_status st = groom_document_operator_write(e->groom, 0, NULL, &text, &n_bytes, e->diag);
+    if (st != GROOM_OK)
+        return st;
+    cJSON *layer = cJSON_ParseWithLength(text, n_bytes);
+    cJSON *contact = cJSON_DetachItemFromObjectCaseSensitive(layer, "contact");
+    if (contact)
+        cJSON_AddItemToObject(root, "contact", contact);
+    cJSON_Delete(layer);
+    free(text);
+    return GROOM_OK;
+}
+
+static groom_status write_result(const struct edit *e, int fd)
+{
+    const struct groom_write_options options = {.format = GROOM_FORMAT_HAIR};
+    struct groom_sink sink = worker_fd_sink(&fd);
+    cJSON *root = describe(e);
+    groom_status st = e->groom->operators[0].layer->contact.n ? add_contact(e, root) : GROOM_OK;
+    char *line = cJSON_PrintUnformatted(root);
+    cJSON_Delete(root);
+    if (st == GROOM_OK)
+        st = line ? sink.write(sink.user, line, strlen(line)) : GROOM_ENOMEM;
+    if (st == GROOM_OK)
+        st = sink.write(sink.user, "\n", 1);
+    cJSON_free(line);
+    return st == GROOM_OK ? groom_strands_write(e->after, &options, sink, e->context, e->diag) : st;
+}
+
+static groom_status deliver(struct edit *e)
+{
+    int fd = memfd_create("result", MFD_CLOEXEC);
+    if (fd < 0)
+        return groom_fail(e->diag, GROOM_ENOMEM, "no memory for the result");
+    groom_status st = write_result(e, fd);
+    off_t n_bytes = lseek(fd, 0, SEEK_CUR);
+    void *bytes = st == GROOM_OK && n_bytes > 0 ? mmap(NULL, (size_t)n_bytes, PROT_READ, MAP_PRIVATE, fd, 0) : MAP_FAILED;
+    close(fd);
+    if (st == GROOM_OK && bytes == MAP_FAILED)
+        st = groom_fail(e->diag, GROOM_EIO, "the result could not be kept");
+    if (st == GROOM_OK)
+        st = work_link_call(e->link,
+                            &(struct http_request){.method = "POST", .path = WORK_PATH_RESULT,
+                                                   .content_type = "application/octet-stream", .body = bytes,
+                                                   .n_body = (uint64_t)n_bytes},
+                            NULL, e->diag);
+    if (bytes != MAP_FAILED)
+        munmap(bytes, (size_t)n_bytes);
+    return st;
+}
+
+groom_status edit_attempt(struct work_link *link, const struct groom_mesh *head, const struct groom_context *context,
+                          struct progress_report *report, struct groom_diag *diag)
+{
+    struct edit e = {.link = link, .context = context, .progress = report, .diag = diag, .started_s = clock_s()};
+    groom_status st = take_strands(&e);
+    if (st == GROOM_OK)
+        st = take_layer(&e);
+    if (st == GROOM_OK && head)
+        st = groom_bvh_create(head, context, &e.head, diag);
+    if (st == GROOM_OK)
+        st = solve(&e);
+    if (st == GROOM_OK)
+        st = deliver(&e);
+    groom_layer_input_destroy(e.input);
+    groom_bvh_destroy(e.head);
+    groom_destroy(e.groom);
+    groom_strands_destroy(e.before);
+    groom_strands_destroy(e.after);
+    return st;
+}
