@@ -100,6 +100,60 @@ static const struct option_spec edit_options[] = {
     {0},
 };
 
+#define LAYER_OPTIONS                                                                                                  \
+    {"layer", 0, "ID", "change this layer of the chain; what is not named here stays as it is (a new one, at the end)"}, \
+    {"elements", 0, "N", "helical elements of each strand, or auto (auto)"},                                           \
+    {"head", 0, "HEAD", "of uploaded strands: the head that the groom is to have"},                                    \
+    {"body", 0, "FILE", "the edit as JSON; options come on top"},                                                      \
+    {"try", 0, NULL, "say what it would do, and write nothing"},                                                       \
+    {"wait", 'w', NULL, "where it becomes a job, wait for its end"},                                                   \
+    {"if-match", 0, "N", "refuse unless the latest revision is this one"}
+#define GROUP_OPTIONS {"groups", 0, "G", "all, operator_guides, or a number of k-means clusters (all)"}
+
+static const struct option_spec ruffle_options[] = {
+    {"rho", 0, "R", "how much is exchanged, 0..1 (0.3)"},
+    {"match-elements", 0, "N", "elements next to the root that stay (4)"},
+    {"blend", 0, "B", "how far each goes, 0..1 (1)"},
+    {"seed", 0, "N", "another seed, another head (1)"},
+    GROUP_OPTIONS,
+    LAYER_OPTIONS,
+    {0},
+};
+
+static const struct option_spec sculpt_options[] = {
+    {"anchor", 0, "STRAND,AT,X,Y,Z", "a control point (AT: 0 root, 1 tip) and where it goes, metres; any number of them"},
+    {"anchors", 0, "FILE", "anchors as JSON"},
+    {"clusters", 0, "N", "k-means clusters that frames move"},
+    {"cluster-seed", 0, "N", "of these (1)"},
+    {"frames", 0, "FILE", "moved frames as JSON: [{\"cluster\",\"at\",\"transform\"},...]"},
+    {"stiffness", 0, "C", "how much curls resist, cm^4 (10)"},
+    {"through-head", 0, NULL, "do not push strands out of the head"},
+    LAYER_OPTIONS,
+    {0},
+};
+
+static const struct option_spec interpolate_options[] = {
+    {"t", 0, "T", "0: this groom, 1: the other (0.5)"},
+    {"groom", 0, "GROOM", "the other groom"},
+    {"revision", 0, "N", "of the other groom, or of this one"},
+    {"strands", 0, "STRANDS", "uploaded strands as the other side"},
+    LAYER_OPTIONS,
+    {0},
+};
+
+static const struct option_spec curl_scale_options[] = {
+    {"radius", 0, "F", "factor of each curl's radius (1)"},
+    {"step", 0, "F", "factor of the rise of each turn (1)"},
+    {"ramp", 0, "ROOT,TIP", "how much of the change there is at root and tip, 0..1 (1,1)"},
+    {"keep", 0, "WHAT", "length or turns (length)"},
+    {"largest-radius", 0, "M", "wider bends are not curls and stay (0: all are)"},
+    {"group", 0, "N", "change this group alone"},
+    {"free-direction", 0, NULL, "let strands turn about their roots"},
+    GROUP_OPTIONS,
+    LAYER_OPTIONS,
+    {0},
+};
+
 static const struct option_spec sample_options[] = {
     {"output", 'o', "FOLDER", "gets strands.hair, head.obj, truth.groom.json and cameras.json"},
     {"style", 0, "S", "straight, wavy, curly, coily, short, spiky or bent (curly)"},
@@ -130,6 +184,10 @@ const struct command groomctl_commands[] = {
      "how alike strands are to a target; a groom's own is what it was fitted to; two files need no server", command_compare},
     {"set", "GROOM /POINTER=VALUE...", 2, MANY, edit_options, "change a groom: /operators/2/radius=0.01", command_set},
     {"patch", "GROOM FILE", 2, 2, edit_options, "change a groom by a JSON Patch or merge patch", command_patch},
+    {"ruffle", "GROOM|STRANDS", 1, 1, ruffle_options, "exchange pieces of hair between strands", command_ruffle},
+    {"sculpt", "GROOM|STRANDS", 1, 1, sculpt_options, "move control points or clusters, the curls kept", command_sculpt},
+    {"interpolate", "GROOM|STRANDS", 1, 1, interpolate_options, "blend with another groom, revision or upload", command_interpolate},
+    {"curl-scale", "GROOM|STRANDS", 1, 1, curl_scale_options, "make curls wider or narrower, steeper or flatter", command_curl_scale},
     {"revisions", "GROOM", 1, 1, NULL, "the history of a groom", command_revisions},
     {"revert", "GROOM REVISION", 2, 2, edit_options, "a new revision that is the same as an earlier one", command_revert},
     {"import", "FILE", 1, 1, NULL, "a groom document of another server", command_import},

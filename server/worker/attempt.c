@@ -39,12 +39,6 @@ struct attempt {
 
 /* --- what is needed ----------------------------------------------------------------------- */
 
-static int is_edit(const struct attempt *a)
-{
-    groom_operator_type type;
-    return groom_operator_parse(a->order.kind, &type, NULL) == GROOM_OK && groom_operator_is_layer(type);
-}
-
 static groom_status take_order(struct attempt *a)
 {
     struct http_response response;
@@ -53,7 +47,7 @@ static groom_status take_order(struct attempt *a)
     if (st == GROOM_OK)
         st = order_parse(response.body, response.n_body, &a->order, &a->diag);
     http_response_finish(&response);
-    if (st == GROOM_OK && strcmp(a->order.kind, "fit") && !is_edit(a))
+    if (st == GROOM_OK && strcmp(a->order.kind, "fit") && !order_is_edit(&a->order))
         st = groom_fail_field(&a->diag, GROOM_EINVAL, "/kind",
                               "this worker runs fits and edits in curvature space, not jobs of kind \"%.15s\"",
                               a->order.kind);
@@ -307,7 +301,7 @@ static groom_status run_edit(struct attempt *a)
 static groom_status run(struct attempt *a)
 {
     groom_status st = take_order(a);
-    if (st == GROOM_OK && is_edit(a))
+    if (st == GROOM_OK && order_is_edit(&a->order))
         return run_edit(a);
     if (st == GROOM_OK)
         st = take_input(a, &a->order.strands, read_strands);

@@ -1,5 +1,7 @@
 #include "server/worker/order.h"
 
+#include "groom/groom.h"
+
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -59,6 +61,12 @@ static groom_status parse_options(const cJSON *order_json, struct order *order, 
     return order->options ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for the options");
 }
 
+int order_is_edit(const struct order *order)
+{
+    groom_operator_type type;
+    return groom_operator_parse(order->kind, &type, NULL) == GROOM_OK && groom_operator_is_layer(type);
+}
+
 static groom_status parse_members(const cJSON *json, struct order *order, struct groom_diag *diag)
 {
     const cJSON *inputs = member(json, "inputs"), *head = member(inputs, "head"),
@@ -69,8 +77,8 @@ static groom_status parse_members(const cJSON *json, struct order *order, struct
     snprintf(order->job, sizeof order->job, "%s", text_of(json, "job"));
     snprintf(order->kind, sizeof order->kind, "%s", text_of(json, "kind"));
     order->attempt = (uint32_t)number_of(json, "attempt", 1);
-    st = GROOM_OK; /* an edit's strands come from the daemon, which evaluates what they are edited in */
-    if (!strcmp(order->kind, "fit") || cJSON_IsObject(member(inputs, "strands")))
+    st = GROOM_OK;
+    if (!order_is_edit(order))
         st = parse_input(member(inputs, "strands"), "strands", &order->strands, diag);
     if (st == GROOM_OK && cJSON_IsObject(head))
         st = parse_input(head, "head", &order->head, diag);

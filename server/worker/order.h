@@ -36,6 +36,8 @@ struct order {
 /* returns  GROOM_OK; GROOM_EFORMAT (not an order); GROOM_ENOMEM */
 GROOM_MUST_CHECK groom_status order_parse(const char *json, size_t n_bytes, struct order *order,
                                           struct groom_diag *diag);
+/* Whether it is an edit in curvature space: its strands come from the daemon, evaluated. */
+int order_is_edit(const struct order *order);
 void order_finish(struct order *order); /* takes zeroed values */
 
 #endif

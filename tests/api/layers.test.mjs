@@ -1,7 +1,7 @@
 // Layers: ruffle, sculpt, interpolate and curl-scale, on grooms and on uploaded strands.
 import test from 'node:test';
 import assert from 'node:assert/strict';
-import { startDaemon } from '../support/daemon.mjs';
+import { groomctl, startDaemon } from '../support/daemon.mjs';
 import { array, decode, expect, groom_document, hair, head_obj, refused, startIdleDaemon } from '../support/api.mjs';
 
 const M = 40;
@@ -287,4 +287,29 @@ test('an edit whose groom is changed while it waits fails, and says so', async (
   await expect(daemon, 400, 'POST', '/v1/work/result', { token, body: 'nothing' });
   await expect(daemon, 204, 'POST', '/v1/work/failed', { token, body: { type: '/problems/invalid-argument', title: 'x', status: 400, detail } });
   assert.equal((await expect(daemon, 200, 'GET', `/v1/jobs/${job.id}`)).json.state, 'failed');
+});
+
+test('groomctl edits in curvature space', async (t) => {
+  const daemon = await startDaemon(t);
+  const str = await upload(daemon, 60);
+  const run = async (...words) => {
+    const done = await groomctl(daemon, ['--json', ...words]);
+    assert.equal(done.status, 0, done.stderr);
+    return JSON.parse(done.stdout);
+  };
+  const made = await run('ruffle', str, '--rho', '0.4', '--groups', '3', '--seed', '9');
+  assert.deepEqual([made.type, made.revision], ['ruffle', 1]);
+  const sculpt = await run('sculpt', made.groom, '--anchor', '3,1,0.02,1.6,0', '--anchor', '4,0.5,0.02,1.65,0', '--stiffness', '2', '--elements', '20');
+  assert.equal(sculpt.anchors, 2);
+  assert.equal((await run('sculpt', made.groom, '--layer', String(sculpt.layer), '--anchor', '3,1,0.03,1.6,0', '--try')).committed, false);
+  await run('curl-scale', made.groom, '--radius', '1.3', '--ramp', '0,1', '--keep', 'turns', '--if-match', '2');
+  assert.equal((await run('interpolate', made.groom, '--revision', '1', '--t', '0.25')).revision, 4);
+  const words = await groomctl(daemon, ['sculpt', made.groom, '--clusters', '4', '--try']);
+  assert.match(words.stdout, /0 of 0 strands changed/);
+  for (const [bad, status, what] of [[['ruffle', made.groom, '--rho', '2'], 1, /rho/], [['sculpt', made.groom, '--anchor', '3,1'], 2, /STRAND,AT/],
+    [['curl-scale', made.groom, '--ramp', '1'], 2, /ROOT,TIP/], [['ruffle', made.groom, '--if-match', '1'], 1, /revision/], [['ruffle'], 2, /./]]) {
+    const refusal = await groomctl(daemon, bad);
+    assert.equal(refusal.status, status, refusal.stderr);
+    assert.match(refusal.stderr, what);
+  }
 });
