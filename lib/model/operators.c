@@ -29,23 +29,23 @@ static const struct groom_operator_parameter frizz_parameters[] = {
     {"amplitude", "m", 0.0f, 0.2f, 0.03f, 0.004f, "Size of the noise; strands move by about a tenth of it."},
 };
 static const struct groom_operator_parameter ruffle_parameters[] = {
-    {"rho", "", 0.0f, 1.0f, 0.3f, 1.0f, "How much of the hair is exchanged between strands: the chance of each piece."},
+    {"rho", "", 0.0f, 1.0f, 1.0f, 0.3f, "How much of the hair is exchanged between strands: the chance of each piece."},
     {"blend", "", 0.0f, 1.0f, 1.0f, 1.0f, "How far each piece goes from its own shape to the other strand's."},
-    {"match_elements", "count", 0.0f, 4096.0f, 4.0f, 20.0f, "Pieces next to the root that stay as they are."},
+    {"match_elements", "count", 0.0f, 4096.0f, 20.0f, 4.0f, "Pieces next to the root that stay as they are."},
 };
 static const struct groom_operator_parameter sculpt_parameters[] = {
-    {"stiffness", "cm^4", 0.0f, 1e6f, 10.0f, 100.0f,
+    {"stiffness", "cm^4", 0.0f, 1e6f, 100.0f, 10.0f,
      "How much strands keep their curls: 0 gives way to the anchors wherever these pull."},
 };
 static const struct groom_operator_parameter interpolate_parameters[] = {
-    {"t", "", 0.0f, 1.0f, 0.5f, 1.0f, "0 is this groom, 1 the other."},
+    {"t", "", 0.0f, 1.0f, 1.0f, 0.5f, "0 is this groom, 1 the other."},
 };
 static const struct groom_operator_parameter curl_scale_parameters[] = {
-    {"radius", "", 0.01f, 100.0f, 1.0f, 3.0f, "Factor of the radius of each curl."},
-    {"step", "", 0.01f, 100.0f, 1.0f, 3.0f, "Factor of the rise of each turn."},
+    {"radius", "", 0.01f, 100.0f, 3.0f, 1.0f, "Factor of the radius of each curl."},
+    {"step", "", 0.01f, 100.0f, 3.0f, 1.0f, "Factor of the rise of each turn."},
     {"ramp_root", "", 0.0f, 1.0f, 1.0f, 1.0f, "How much of the change there is at the root."},
     {"ramp_tip", "", 0.0f, 1.0f, 1.0f, 1.0f, "How much of the change there is at the tip."},
-    {"largest_radius", "m", 0.0f, 10.0f, 0.0f, 0.1f, "Bends wider than this are not curls and stay; 0: all are."},
+    {"largest_radius", "m", 0.0f, 10.0f, 0.1f, 0.0f, "Bends wider than this are not curls and stay; 0: all are."},
 };
 
 static const struct groom_operator_random truncated_normal[] = {{"u", -1.0f, 1.0f}};

@@ -109,6 +109,47 @@ test('from files to a groom, a knob, back, and home', { skip, timeout: 300000 },
   });
 });
 
+test('ruffle and sculpt: seen under the hand, kept as layers, taken away again', { skip, timeout: 300000 }, async (t) => {
+  const daemon = await startDaemon(t), folder = sample(t), page = await startBrowser(t, daemon);
+  const imported = await daemon.fetch('/v1/grooms', { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: readFileSync(join(folder, 'truth.groom.json')) });
+  await page.goto(`${daemon.url}/#/grooms/${(await imported.json()).groom}`);
+  await settled(page, 1);
+  const before = await shown(page);
+  await t.test('a ruffle is an operator like others', async () => {
+    await page.getByLabel('Operator to add').selectOption('ruffle');
+    await page.getByRole('button', { name: 'add', exact: true }).click();
+    await settled(page, 2);
+    assert.notDeepEqual(await shown(page), before);
+    const tried = await page.evaluate(async () => {
+      const { session, evaluation } = window.studio, at = session.operators.length - 1, now = evaluation.strands.points.slice();
+      await session.turn(at, 'rho', 0.9);
+      return { differs: evaluation.strands.points.some((x, i) => x !== now[i]), revision: session.revision };
+    });
+    assert.deepEqual(tried, { differs: true, revision: 2 });
+  });
+  await t.test('a lock follows its armature', async () => {
+    await page.getByRole('button', { name: 'show armature' }).click();
+    await page.waitForFunction(() => window.studio.armature.joints.length > 8);
+    await page.evaluate(async () => {
+      const { armature } = window.studio, tip = armature.joints.find((joint) => joint.at === 1);
+      tip.object.position.x += 0.12;
+      tip.object.position.y += 0.06;
+      await armature.attempt();
+    });
+    await picture(page, 'studio-sculpt');
+    await page.evaluate(() => window.studio.armature.commit());
+    await settled(page, 3);
+    assert.deepEqual(await page.evaluate(() => window.studio.session.operators.map((o) => o.type).slice(-2)), ['ruffle', 'sculpt']);
+  });
+  await t.test('without its layers the groom is as it was', async () => {
+    for (const [type, revision] of [['sculpt', 4], ['ruffle', 5]]) {
+      await page.getByLabel(`remove: ${type}`).click();
+      await settled(page, revision);
+    }
+    assert.deepEqual(await shown(page), before);
+  });
+});
+
 test('pages pass an accessibility check and fit a narrow window', { skip, timeout: 120000 }, async (t) => {
   const daemon = await startDaemon(t), folder = sample(t), page = await startBrowser(t, daemon);
   const imported = await daemon.fetch('/v1/grooms', { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: readFileSync(join(folder, 'truth.groom.json')) });

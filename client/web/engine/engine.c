@@ -97,7 +97,7 @@ void EXPORT(engine_draw)(struct groom *groom, uint32_t index, uint32_t seed_high
 
 const char *EXPORT(engine_type_name)(uint32_t type)
 {
-    return type < GROOM_OPERATOR_COUNT ? groom_operator_name((groom_operator_type)type) : NULL;
+    return type < GROOM_OPERATOR_TYPES ? groom_operator_name((groom_operator_type)type) : NULL;
 }
 
 uint32_t EXPORT(engine_n_parameters)(uint32_t type)
@@ -129,7 +129,20 @@ groom_status EXPORT(engine_evaluate)(const struct groom *groom, uint32_t first, 
     return groom_evaluate(groom, first, count, out, NULL, &last);
 }
 
-/* The first `count` strands of the fair order alone: what a viewer shows of many. */
+static int compare_indices(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* The first `count` strands of the fair order, rising: those that the daemon exports of so many. */
+void EXPORT(engine_fair)(uint32_t n_strands, uint32_t count, uint32_t *order)
+{
+    groom_fair_order(n_strands, order);
+    qsort(order, count, sizeof *order, compare_indices);
+}
+
+/* These strands alone: what a viewer shows of many. */
 struct groom *EXPORT(engine_select)(const struct groom *groom, uint32_t count)
 {
     struct groom *selected = NULL;
@@ -137,7 +150,7 @@ struct groom *EXPORT(engine_select)(const struct groom *groom, uint32_t count)
     memset(&last, 0, sizeof last);
     if (!order)
         return NULL;
-    groom_fair_order(groom->n_strands, order);
+    engine_fair(groom->n_strands, count, order);
     groom_status st = groom_select(groom, order, count, NULL, &selected, &last);
     free(order);
     return st == GROOM_OK ? selected : NULL;

@@ -81,6 +81,15 @@ export class Engine {
 
     copyIn(bytes, address) { new Uint8Array(this.memory, address, bytes.length).set(bytes); }
 
+    /* Which strands of n are shown, and exported, where `count` of them are: rising. */
+    fair(n, count) {
+        const address = this.exports.engine_allocate(4 * n);
+        this.exports.engine_fair(n, count, address);
+        const order = new Uint32Array(this.memory, address, count).slice();
+        this.exports.engine_release(address);
+        return order;
+    }
+
     /* Shadows within strands at an address: { size, origin, cell, data }, data as bytes of [cell][2]: how
      * much of the key light arrives, how much of the surroundings is seen. */
     light(points, count, vertices, { cells, width, key }) {

@@ -7,6 +7,7 @@ import { arrayOf, fetchHead, fetchStrands } from './strands.mjs';
 import { exportPanel } from './panels/export.mjs';
 import { historyPanel } from './panels/history.mjs';
 import { operatorsPanel } from './panels/operators.mjs';
+import { sculptPanel } from './panels/sculpt.mjs';
 import { Hair, boxOf } from './viewer/hair.mjs';
 import { COMPARISONS, VIEWS, Viewer } from './viewer/viewer.mjs';
 
@@ -17,6 +18,14 @@ class Evaluation {
     constructor(session, viewer) {
         Object.assign(this, { session, viewer, running: false, again: false });
         session.addEventListener('strands', () => this.request().catch(notice));
+        session.addEventListener('attempt', () => this.#attempt());
+    }
+
+    /* Strands of an attempt in place of their own, until the next evaluation. */
+    #attempt() {
+        const { vertices } = this.strands;
+        for (const { slot, points } of this.session.attempt) this.strands.points.set(points, 3 + 3 * slot * vertices);
+        this.viewer.show(this.viewer.groom, this.strands);
     }
 
     async request() {
@@ -25,7 +34,7 @@ class Evaluation {
         try {
             do {
                 this.again = false;
-                this.strands = await this.session.thread.call('evaluate');
+                this.strands = await this.session.strands();
                 this.viewer.show(this.viewer.groom, this.strands);
                 say(`${whole(this.strands.count)} of ${whole(this.session.document.strands.count)} strands, ${this.strands.ms.toFixed(0)} ms`);
             } while (this.again);
@@ -35,7 +44,7 @@ class Evaluation {
     }
 
     async light() {
-        await shine(this.viewer, this.viewer.groom, this.session.thread);
+        await shine(this.viewer, this.viewer.groom, this.session.thread, this.session.remote ? this.strands : undefined);
         this.lit = true;
     }
 }
@@ -58,7 +67,7 @@ async function showTarget(viewer, { document, count: most, thread }) {
 }
 
 function showGuides(viewer, document, on) {
-    if (!on) { viewer.setGuides({ points: [], count: 0, vertices: 0 }); return; }
+    if (!on || !document.guides) { viewer.setGuides({ points: [], count: 0, vertices: 0 }); return; }
     const operator_guides = new Set(arrayOf(document.operator_guides.guide));
     viewer.setGuides({ ...document.guides, points: arrayOf(document.guides.points) }, operator_guides);
 }
@@ -95,6 +104,7 @@ export async function groomPage(main, id, strands = AT_FIRST) {
     const editor = new GuideEditor(viewer, session), comparing = viewPanel(work, session, viewer, editor), chain = element('div', { class: 'chain' });
     work.append(chain);
     operatorsPanel(chain, session, types);
+    const armature = sculptPanel(work, session, viewer);
     historyPanel(work, session);
     exportPanel(work, session);
     work.append(element('section', { class: 'panel' }, element('h2', {}, 'Picture'),
@@ -106,6 +116,6 @@ export async function groomPage(main, id, strands = AT_FIRST) {
     const { head } = session.document.source ?? {};
     if (head) fetchHead(head).then((geometry) => viewer.setHead(geometry)).catch(notice);
     showTarget(viewer, session).then((shown) => { comparing.hidden = !shown; }).catch(notice);
-    window.studio = { viewer, session, evaluation, editor }; /* for those who look inside, tests among them */
+    window.studio = { viewer, session, evaluation, editor, armature }; /* for those who look inside, tests among them */
     return () => { viewer.dispose(); thread.close(); };
 }

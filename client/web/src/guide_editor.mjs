@@ -50,7 +50,7 @@ export class GuideEditor {
     }
 
     #load() {
-        const { guides } = this.session.document;
+        const guides = this.session.document.guides ?? { points: { dtype: 'f32', data: '' }, count: 0, vertices: 0 }; /* a base has none */
         this.points = arrayOf(guides.points);
         Object.assign(this, { count: guides.count, vertices: guides.vertices });
         this.#show();

@@ -1,7 +1,12 @@
 /* A groom that is open for work: the document, its revision, and the edits between them. A slider
  * moves the page at once; the edit then goes to the server as a PATCH with If-Match, and the server's
  * revision is the truth. Undo and redo walk along the revisions by reverting. */
-import { call, get } from './api.mjs';
+import { call, follow, get } from './api.mjs';
+import { arrayOf, fetchGroomStrands } from './strands.mjs';
+
+const LAYERS = ['ruffle', 'sculpt', 'interpolate', 'curl_scale'];
+/* A layer is tried under the hand on so many strands at most (the daemon's limit). */
+const MOST_TO_TRY = 5000;
 
 export class Session extends EventTarget {
     constructor(id, thread) {
@@ -12,12 +17,77 @@ export class Session extends EventTarget {
     get at() { return `/v1/grooms/${this.id}`; }
     get operators() { return this.document.operators; }
 
+    /* Layers, and grooms on strands of an upload, are the daemon's to evaluate: they look at all strands. */
+    get remote() {
+        return Boolean(this.document.base) || this.operators.some((o) => LAYERS.includes(o.type) && o.enabled !== false);
+    }
+
     async open(count) {
         const { json, etag } = await call('GET', this.at);
         this.#take(json, etag);
         this.count = Math.min(count, json.strands.count);
-        this.opened = await this.thread.call('open', { document: json, count: this.count });
-        return this.opened;
+        await this.#load();
+        return this.thread.call('about');
+    }
+
+    async #load() {
+        if (!this.remote) await this.thread.call('open', { document: this.document, count: this.count });
+    }
+
+    /* What is to be seen: { points, count, vertices, ms }. */
+    async strands() {
+        if (!this.remote) return this.thread.call('evaluate');
+        const from = performance.now(), strands = await fetchGroomStrands(this.at, this.revision, this.count);
+        return { ...strands, ms: performance.now() - from };
+    }
+
+    /* --- layers under the hand --- */
+
+    /* An attempt's strands in place of those that are shown: `points` as the daemon answers. */
+    async tryOn(points) {
+        const vertices = this.document.strands.vertices, made = arrayOf(points.points), slots = await this.#slots();
+        this.attempt = arrayOf(points.strand).reduce((found, strand, i) => {
+            if (slots.has(strand)) found.push({ slot: slots.get(strand), points: made.subarray(3 * i * vertices, 3 * (i + 1) * vertices) });
+            return found;
+        }, []);
+        this.#tell('attempt');
+    }
+
+    /* Where each strand that is shown stands. */
+    async #slots() {
+        const n = this.document.strands.count;
+        if (this.slots?.count !== this.count) {
+            const order = await this.thread.call('fair', { n, count: this.count });
+            this.slots = { count: this.count, map: new Map(Array.from(order, (strand, slot) => [strand, slot])) };
+        }
+        return this.slots.map;
+    }
+
+    /* A layer's knob while it turns: tried where it is the last of the chain and the daemon answers at once. */
+    async #tryLayer(index) {
+        const operator = this.operators[index];
+        if (index !== this.operators.length - 1 || this.document.strands.count > MOST_TO_TRY || this.trying) return;
+        this.trying = true;
+        try {
+            const { random, type, id, enabled, ...given } = operator;
+            const { json } = await call('POST', `${this.at}/${type.replace('_', '-')}`, { body: { ...given, layer: id, commit: false }, headers: { 'If-Match': this.etag } });
+            if (json.points) await this.tryOn(json.points);
+        } finally { this.trying = false; }
+    }
+
+    /* A layer of this kind onto the chain, or its change; a long one is a job that is waited for. */
+    layer(kind, body) {
+        let answer;
+        return this.#queue(async () => {
+            const { json, etag, response } = await call('POST', `${this.at}/${kind}`, { body, headers: { 'If-Match': this.etag } });
+            if (response.status === 202) await new Promise((resolve, reject) => follow(json.id, (name, data) => {
+                if (name !== 'state') return;
+                if (data.state === 'succeeded') resolve();
+                else if (['failed', 'cancelled'].includes(data.state)) reject(new Error(`the job ${json.id} ${data.state}`));
+            }));
+            answer = json;
+            return { json, etag };
+        }, true).then(() => answer);
     }
 
     #take(document, etag) {
@@ -30,19 +100,22 @@ export class Session extends EventTarget {
     /* While the knob turns: the page alone. */
     async turn(index, parameter, value) {
         this.operators[index][parameter] = value;
+        if (LAYERS.includes(this.operators[index].type)) return this.#tryLayer(index);
+        if (this.remote) return undefined; /* seen when the knob rests */
         await this.thread.call('set', { index, type: this.operators[index].type, parameter, value });
-        this.#tell('strands');
+        return this.#tell('strands');
     }
 
     /* The knob rests: a revision. Edits go out one after another, each on the revision of the one before. */
     settle(index, parameter) {
-        return this.patch([{ op: 'replace', path: `/operators/${index}/${parameter}`, value: this.operators[index][parameter] }], { reload: false });
+        return this.patch([{ op: 'add', path: `/operators/${index}/${parameter}`, value: this.operators[index][parameter] }], { reload: this.remote });
     }
 
     /* A guide under the hand, and at rest: all guides go to the server as a file. */
     async moveGuide(guide, points) {
+        if (this.remote) return undefined;
         await this.thread.call('moveGuide', { guide, points });
-        this.#tell('strands');
+        return this.#tell('strands');
     }
 
     putGuides(file) {
@@ -78,14 +151,14 @@ export class Session extends EventTarget {
     async reload() {
         const { json, etag } = await call('GET', this.at);
         this.#take(json, etag);
-        await this.thread.call('open', { document: json, count: this.count });
+        await this.#load();
         this.#tell('document');
         this.#tell('strands');
     }
 
     async choose(count) {
         this.count = count;
-        await this.thread.call('choose', { count });
+        if (!this.remote) await this.thread.call('choose', { count });
         this.#tell('strands');
     }
 

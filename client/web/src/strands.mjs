@@ -13,6 +13,10 @@ function parse(buffer) {
     return { points, count, vertices };
 }
 
+/* A groom's strands as the daemon evaluates them. */
+export const fetchGroomStrands = async (at, revision, count) =>
+    parse(await bytes(`${at}/strands?format=data&revision=${revision}&count=${count}`));
+
 /* So many of an upload's strands, evenly resampled. */
 export const fetchStrands = async (id, count, vertices) =>
     parse(await bytes(`/v1/strands/${id}/data?format=data&count=${count}&vertices=${vertices}`));

@@ -14,6 +14,8 @@ function choose(count) {
 const both = (work) => { work(whole); if (shown !== whole) work(shown); };
 
 const calls = {
+    async about() { return { types: (await engine).types }; },
+    async fair({ n, count }) { return (await engine).fair(n, count); },
     async open({ document, count }) {
         const loaded = await engine;
         if (shown && shown !== whole) shown.destroy();

@@ -2,16 +2,18 @@
 import GUI from 'lil-gui';
 import { element, notice } from '../dom.mjs';
 
-const LABELS = { m: 'mm', rad: '°', '1/m': '/cm', '': '' };
+const LABELS = { m: 'mm', rad: '°', '1/m': '/cm' };
 /* What a groomer reads, from what the document holds. */
-const SCALES = { m: 1000, rad: 180 / Math.PI, '1/m': 0.01, '': 1 };
+const SCALES = { m: 1000, rad: 180 / Math.PI, '1/m': 0.01 };
+/* Layers that mean nothing without a hand or another groom. */
+const NOT_ADDED = ['sculpt', 'interpolate'];
 
 function parameterSlider(folder, session, index, parameter) {
     const { name, unit, minimum, slider_maximum: top, initial, help } = parameter, scale = SCALES[unit] ?? 1;
     const operator = session.operators[index];
     const shown = { value: (operator[name] ?? initial) * scale };
     const low = Math.max(minimum, minimum < 0 ? -top : minimum) * scale;
-    const controller = folder.add(shown, 'value', low, top * scale).name(`${name.replaceAll('_', ' ')}${LABELS[unit] ? ` (${LABELS[unit]})` : ''}`);
+    const controller = folder.add(shown, 'value', low, top * scale, ...(unit === 'count' ? [1] : [])).name(`${name.replaceAll('_', ' ')}${LABELS[unit] ? ` (${LABELS[unit]})` : ''}`);
     controller.decimals(2);
     controller.onChange((value) => session.turn(index, name, value / scale).catch(notice));
     controller.onFinishChange(() => session.settle(index, name).catch(notice));
@@ -37,7 +39,7 @@ function operatorFolder(gui, session, types, index) {
     };
     const row = element('div', { class: 'row' });
     for (const [label, work] of Object.entries(actions))
-        if (label !== 'new seed' || type?.random.length)
+        if (label !== 'new seed' || type?.random.length || type?.name === 'ruffle')
             row.append(element('button', { type: 'button', onclick: work, 'aria-label': `${label}: ${operator.type}` }, label));
     folder.$children.append(row);
     if (!on) folder.close();
@@ -50,7 +52,7 @@ export function operatorsPanel(parent, session, types) {
         gui?.destroy();
         gui = new GUI({ container: parent, injectStyles: false, title: 'Operators' });
         session.operators.forEach((_, index) => operatorFolder(gui, session, types, index));
-        const choose = element('select', { 'aria-label': 'Operator to add' }, types.map((t) => element('option', {}, t.name)));
+        const choose = element('select', { 'aria-label': 'Operator to add' }, types.filter((t) => !NOT_ADDED.includes(t.name)).map((t) => element('option', {}, t.name)));
         gui.$children.append(element('div', { class: 'row' }, choose, element('button', {
             type: 'button',
             onclick: () => session.patch([{ op: 'add', path: '/operators/-', value: { type: choose.value } }]).catch(notice),
