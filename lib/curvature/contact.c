@@ -12,13 +12,20 @@
 
 struct groom_contact_options groom_contact_options_default(void)
 {
-    return (struct groom_contact_options){.n_samples = 32, .max_rounds = 4, .root_share = 0.05, .margin_m = 0.001};
+    return (struct groom_contact_options){.n_samples = 32, .max_rounds = 8, .root_share = 0.05, .margin_m = 0.001};
 }
 
 /* A station that is held outside: moved on each time it is found inside again. */
 struct push {
     uint32_t station;
     double target[3];
+};
+
+/* The least deep of all that was tried for a strand, and what held it there. */
+struct best {
+    float depth;
+    uint8_t n_pushes;
+    struct push pushes[MOST_PUSHES];
 };
 
 struct contact_space {
@@ -33,6 +40,8 @@ struct contact_job {
     float *allowed;         /* [n_strands][n_samples] depth that the rest shape has there already */
     struct push *pushes;    /* [n_strands][MOST_PUSHES] */
     uint8_t *n_pushes;      /* [n_strands] */
+    struct best *best;      /* [n_strands] */
+    double (*best_q)[3];    /* [n_elements] */
     struct contact_space *spaces;
     uint32_t n_spaces, round;
 };
@@ -122,14 +131,13 @@ static void add_push(const struct contact_job *job, uint32_t i, uint32_t station
     job->n_pushes[i] += !known;
 }
 
-/* The deepest station of each run inside gets a push. */
-static void find_strand(const struct contact_job *job, struct contact_space *space, uint32_t i)
+/* The deepest station of each run inside gets a push. returns the depth of the deepest */
+static double push_strand(const struct contact_job *job, struct contact_space *space, uint32_t i)
 {
     uint32_t n = job->options->n_samples, next, worst_station = 0;
     const float *allowed = job->allowed + (size_t)i * n;
     struct groom_surface_point near, worst = {0};
     double most = 0.0, deepest = 0.0;
-    sample(job, space, i);
     for (uint32_t k = 0; k < n; k = next) {
         double depth = depth_of(job->bvh, space->points[k], &near), excess = depth - (double)allowed[k];
         next = next_station(space, k, n, depth);
@@ -141,7 +149,23 @@ static void find_strand(const struct contact_job *job, struct contact_space *spa
             most = 0.0;
         }
     }
+    return deepest;
+}
+
+/* A push may turn a strand into the head somewhere else: what is kept is the best of all rounds. */
+static void find_strand(const struct contact_job *job, struct contact_space *space, uint32_t i)
+{
+    const struct groom_superhelices *h = job->helices;
     struct groom_contact_report *r = &job->reports[i];
+    struct best now = {.n_pushes = job->n_pushes[i]};
+    memcpy(now.pushes, job->pushes + (size_t)i * MOST_PUSHES, sizeof now.pushes);
+    sample(job, space, i);
+    double deepest = push_strand(job, space, i);
+    now.depth = (float)deepest;
+    if (job->round == 0 || now.depth < job->best[i].depth) {
+        job->best[i] = now;
+        memcpy(job->best_q + h->first[i], h->q + h->first[i], (h->first[i + 1] - h->first[i]) * sizeof *h->q);
+    }
     if (job->round == 0)
         r->depth_before_m = (float)deepest;
     r->depth_after_m = (float)deepest;
@@ -186,18 +210,35 @@ static size_t gather_anchors(const struct contact_job *job, const struct groom_a
     return n;
 }
 
-static void tell_held(const struct contact_job *job)
+/* Each strand at its best, and what held it there. */
+static void keep_best(const struct contact_job *job)
 {
+    struct groom_superhelices *h = job->helices;
     double share = job->options->root_share;
-    for (uint32_t i = 0; i < job->helices->n_strands; i++)
-        for (uint32_t k = 0; k < job->n_pushes[i] && job->options->max_rounds > 0; k++) {
-            struct groom_contact_report *r = &job->reports[i];
-            const struct push *p = &job->pushes[(size_t)i * MOST_PUSHES + k];
+    for (uint32_t i = 0; i < h->n_strands; i++) {
+        struct groom_contact_report *r = &job->reports[i];
+        if (!r->checked)
+            continue;
+        memcpy(h->q + h->first[i], job->best_q + h->first[i], (h->first[i + 1] - h->first[i]) * sizeof *h->q);
+        r->depth_after_m = job->best[i].depth;
+        for (uint32_t k = 0; k < job->best[i].n_pushes; k++) {
+            const struct push *p = &job->best[i].pushes[k];
             r->held[k].at = (float)(share + (1.0 - share) * p->station / (job->options->n_samples - 1));
             for (int c = 0; c < 3; c++)
                 r->held[k].position[c] = (float)p->target[c];
             r->n_held = k + 1;
         }
+    }
+}
+
+/* Each round begins where the first did: what comes out then depends on the anchors alone, so that who
+ * has kept what held a strand gets the same strand again. */
+static void start_again(const struct contact_job *job, const double (*rest_q)[3])
+{
+    struct groom_superhelices *h = job->helices;
+    for (uint32_t i = 0; i < h->n_strands; i++)
+        if (job->reports[i].depth_after_m > 0.0f)
+            memcpy(h->q + h->first[i], rest_q + h->first[i], (h->first[i + 1] - h->first[i]) * sizeof *h->q);
 }
 
 static int job_init(struct contact_job *job, const struct groom_context *context)
@@ -206,11 +247,13 @@ static int job_init(struct contact_job *job, const struct groom_context *context
     size_t n = job->helices->n_strands, m = job->options->n_samples;
     job->n_spaces = parallel_threads(context);
     job->allowed = memory_array_zero(a, n * m, sizeof *job->allowed);
-    job->pushes = memory_array(a, n * MOST_PUSHES, sizeof *job->pushes);
+    job->pushes = memory_array_zero(a, n * MOST_PUSHES, sizeof *job->pushes);
+    job->best = memory_array(a, n, sizeof *job->best);
+    job->best_q = memory_array(a, job->helices->n_elements, sizeof *job->best_q);
     job->n_pushes = memory_array_zero(a, n, sizeof *job->n_pushes);
     job->reports = memory_array_zero(a, n, sizeof *job->reports);
     job->spaces = memory_array_zero(a, job->n_spaces, sizeof *job->spaces);
-    int good = job->allowed && job->pushes && job->n_pushes && job->reports && job->spaces;
+    int good = job->allowed && job->pushes && job->best && job->best_q && job->n_pushes && job->reports && job->spaces;
     for (uint32_t k = 0; good && k < job->n_spaces; k++) {
         job->spaces[k].arc = memory_array(a, m, sizeof *job->spaces[k].arc);
         job->spaces[k].points = memory_array(a, m, sizeof *job->spaces[k].points);
@@ -230,6 +273,8 @@ static void job_finish(struct contact_job *job, const struct groom_context *cont
     memory_release(a, job->spaces, job->n_spaces, sizeof *job->spaces);
     memory_release(a, job->allowed, n * m, sizeof *job->allowed);
     memory_release(a, job->pushes, n * MOST_PUSHES, sizeof *job->pushes);
+    memory_release(a, job->best, n, sizeof *job->best);
+    memory_release(a, job->best_q, job->helices->n_elements, sizeof *job->best_q);
     memory_release(a, job->n_pushes, n, sizeof *job->n_pushes);
     memory_release(a, job->reports, n, sizeof *job->reports);
 }
@@ -292,12 +337,13 @@ groom_status groom_superhelices_push_out(struct groom_superhelices *helices, con
         if (job.round >= options->max_rounds || count_inside(&job) == 0)
             break;
         size_t m = gather_anchors(&job, anchors, n_anchors, all);
+        start_again(&job, rest_q);
         if ((st = groom_superhelices_sculpt(helices, rest_q, all, m, sculpt, context, NULL, diag)) != GROOM_OK) {
             memcpy(helices->q, kept, helices->n_elements * sizeof *kept);
             goto out;
         }
     }
-    tell_held(&job);
+    keep_best(&job);
     memcpy(reports, job.reports, n * sizeof *reports);
 out:
     job_finish(&job, context);

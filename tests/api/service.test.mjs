@@ -81,7 +81,7 @@ test('refusals say what to mend', async (t) => {
   await refused(daemon, 400, 'bad-request', 'DELETE', '/v1/jobs/job_x', { body: 'a body' });
   const options = await daemon.fetch('/v1/grooms/x', { method: 'OPTIONS' });
   assert.equal(options.status, 204);
-  assert.equal(options.headers.get('allow'), 'GET, HEAD, PATCH, OPTIONS');
+  assert.equal(options.headers.get('allow'), 'GET, HEAD, DELETE, PATCH, OPTIONS');
   const head = await expect(daemon, 200, 'HEAD', '/healthz');
   assert.equal(head.headers.get('content-length'), '15');
 });

@@ -427,7 +427,7 @@ struct groom_contact_options {
     double margin_m;     /* how far outside a pushed station should come to lie */
 };
 
-/* 32 stations, 4 rounds, the first 5 % spared, 1 mm. */
+/* 32 stations, 8 rounds, the first 5 % spared, 1 mm. */
 struct groom_contact_options groom_contact_options_default(void);
 
 #define GROOM_CONTACT_MOST_HELD 6
@@ -444,7 +444,8 @@ struct groom_contact_report {
 
 /* After a sculpt: strands with anchors that went into the head (a mesh with outward normals) get further
  * anchors that hold their deepest stations outside, and are solved again with the caller's, up to
- * max_rounds times. What lay below the surface at rest may stay as deep. What could not be brought out
+ * max_rounds times, each time from rest: the result depends on the anchors alone, and the best of all rounds
+ * is kept. What lay below the surface at rest may stay as deep. What could not be brought out
  * is told by depth_after_m.
  * helices   the sculpt's result; q changes, lengths, roots and frames do not; untouched on error
  * rest_q    [n_elements][3] the shape before the sculpt
