@@ -23,6 +23,8 @@ struct config {
     char work_url[CONFIG_TEXT_SIZE], work_folder[CONFIG_TEXT_SIZE], slurm_arguments[CONFIG_TEXT_SIZE];
     char hosts[CONFIG_TEXT_SIZE];  /* names of this service, blanks between */
     char config[CONFIG_TEXT_SIZE]; /* the configuration file */
+    char webhook_url[CONFIG_TEXT_SIZE], webhook_secret[CONFIG_TEXT_SIZE];
+    char webhook_allow[CONFIG_TEXT_SIZE]; /* addresses and networks, blanks between */
     /* counts, bytes, seconds */
     uint64_t workers, worker_threads, worker_memory, job_time_s, job_attempts;
     uint64_t max_upload, upload_expiry_s, max_body, min_free, export_cache;
@@ -30,6 +32,7 @@ struct config {
     uint64_t connections, idle_timeout_s, head_timeout_s, min_rate;
     uint64_t slurm_interval_s;
     uint64_t parse_time_s, parse_memory;
+    uint64_t webhook_attempts, webhook_timeout_s;
     uint64_t keep_events_s, keep_keys_s, keep_jobs_s;
     uint64_t max_wait_s, shutdown_s;
     uint64_t log_level; /* enum config_log_level */

@@ -30,6 +30,7 @@
 #include "server/uploads/uploads.h"
 #include "server/upkeep/command.h"
 #include "server/upkeep/control.h"
+#include "server/webhooks/webhooks.h"
 
 #define PATH_SIZE 1400
 
@@ -49,6 +50,7 @@ struct daemon {
     struct supervisor *supervisor;
     struct housekeeper *housekeeper;
     struct control *control;
+    struct webhooks *webhooks;
     struct service service;
     struct server *server;
 };
@@ -233,6 +235,23 @@ static groom_status start_housekeeper(struct daemon *daemon, struct groom_diag *
                              &daemon->housekeeper, diag);
 }
 
+static groom_status start_webhooks(struct daemon *daemon, struct groom_diag *diag)
+{
+    const struct config *config = &daemon->config;
+    const struct store_webhook_new all = {config->webhook_url, config->webhook_secret};
+    groom_status status = GROOM_OK;
+    if (all.url[0] && (status = webhook_url_check(all.url, config->webhook_allow, diag)) == GROOM_OK &&
+        (status = webhook_secret_check(all.secret, diag)) == GROOM_OK)
+        jobs_set_webhook(daemon->jobs, &all);
+    if (status != GROOM_OK)
+        return status;
+    return webhooks_start(&(struct webhooks_options){.store = daemon->store,
+                                                     .allow = config->webhook_allow,
+                                                     .max_attempts = (uint32_t)config->webhook_attempts,
+                                                     .timeout_s = (uint32_t)config->webhook_timeout_s},
+                          &daemon->webhooks, diag);
+}
+
 static groom_status start_control(struct daemon *daemon, struct groom_diag *diag)
 {
     return control_start(&(struct upkeep){.folder = daemon->config.data,
@@ -270,6 +289,7 @@ static groom_status start(struct daemon *daemon, struct groom_diag *diag)
         (status = open_grooms(daemon, diag)) != GROOM_OK ||
         (status = start_supervisor(daemon, diag)) != GROOM_OK ||
         (status = start_housekeeper(daemon, diag)) != GROOM_OK ||
+        (status = start_webhooks(daemon, diag)) != GROOM_OK ||
         (status = start_control(daemon, diag)) != GROOM_OK)
         return status;
     return start_server(daemon, diag);
@@ -281,6 +301,7 @@ static void finish(struct daemon *daemon)
         log_message(CONFIG_LOG_WARNING, "a check or a backup was cut off");
         _exit(0);
     }
+    webhooks_stop(daemon->webhooks);
     housekeeper_stop(daemon->housekeeper);
     server_destroy(daemon->server);
     supervisor_destroy(daemon->supervisor);

@@ -51,6 +51,7 @@ void jobs_call_get(struct request *request);
 void jobs_call_delete(struct request *request);
 void jobs_call_events(struct request *request);
 void jobs_call_losses(struct request *request);
+void jobs_call_deliveries(struct request *request); /* webhook_calls.c */
 
 /* work_calls.c: what an attempt asks and tells */
 void work_call_job(struct request *request);

@@ -8,6 +8,7 @@
 #include "server/http/events.h"
 #include "server/http/handlers.h"
 #include "server/http/server.h"
+#include "server/http/webhook_calls.h"
 #include "server/jobs/jobs.h"
 
 /* --- submit ----------------------------------------------------------------------------- */
@@ -16,6 +17,8 @@
 struct submission {
     char *inputs, *options; /* JSON, malloc'ed */
     int32_t priority;
+    struct store_webhook_new webhook; /* its texts are the body's */
+    size_t n_webhooks;
 };
 
 static bool only_known(struct request *request, const cJSON *body)
@@ -24,12 +27,13 @@ static bool only_known(struct request *request, const cJSON *body)
     char pointer[96];
     cJSON_ArrayForEach(member, body)
     {
-        if (router_knows("kind strands head options priority", member->string))
+        if (router_knows("kind strands head options priority webhook", member->string))
             continue;
         snprintf(pointer, sizeof pointer, "/%.80s", member->string);
         respond_bad_field(
             request, 400, pointer,
-            "\"%.60s\" is not a member of a job; it takes kind, strands, head, options and priority",
+            "\"%.60s\" is not a member of a job; it takes kind, strands, head, options, priority "
+            "and webhook",
             member->string);
         return false;
     }
@@ -123,7 +127,8 @@ static bool take_body(struct request *request, const cJSON *body, struct submiss
         return false;
     }
     return take_inputs(request, body, submission) && take_options(request, body, submission) &&
-           take_priority(request, body, submission);
+           take_priority(request, body, submission) &&
+           webhook_take(request, body, &submission->webhook, &submission->n_webhooks);
 }
 
 static void respond_job(struct request *request, int status, const struct store_job *job)
@@ -147,6 +152,7 @@ static void submit(struct request *request, const struct submission *submission)
                                         .inputs = submission->inputs,
                                         .options = submission->options,
                                         .priority = submission->priority,
+                                        .webhook = submission->n_webhooks ? &submission->webhook : NULL,
                                         .idempotency_key = key};
     groom_status status = jobs_submit(request->service->jobs, &wanted, &job, &created, &diag);
     if (status == GROOM_ECONFLICT) {

@@ -40,6 +40,7 @@ const struct route http_routes[] = {
     {"DELETE", "/v1/jobs/{id}", jobs_call_delete, BODY_NONE, LANE_FAST, "", 0, NULL},
     {"GET", "/v1/jobs/{id}/events", jobs_call_events, BODY_NONE, LANE_FAST, "after", 0, NULL},
     {"GET", "/v1/jobs/{id}/losses", jobs_call_losses, BODY_NONE, LANE_FAST, "", 0, NULL},
+    {"GET", "/v1/jobs/{id}/deliveries", jobs_call_deliveries, BODY_NONE, LANE_FAST, "", 0, NULL},
 
     {"GET", "/v1/grooms", grooms_call_list, BODY_NONE, LANE_FAST, "limit before", 0, NULL},
     {"POST", "/v1/grooms", grooms_call_import, BODY_FILE, LANE_SLOW, "", 0, NULL},

@@ -170,11 +170,26 @@ static groom_status hash_request(const struct jobs_request *request, char hash[S
     return GROOM_OK;
 }
 
+void jobs_set_webhook(struct jobs *jobs, const struct store_webhook_new *webhook) { jobs->webhook = *webhook; }
+
+/* The job's own and everybody's. returns  how many */
+static size_t list_webhooks(const struct jobs *jobs, const struct jobs_request *request,
+                            struct store_webhook_new webhooks[2])
+{
+    size_t n = 0;
+    if (request->webhook)
+        webhooks[n++] = *request->webhook;
+    if (jobs->webhook.url)
+        webhooks[n++] = jobs->webhook;
+    return n;
+}
+
 groom_status jobs_submit(struct jobs *jobs, const struct jobs_request *request, struct store_job *job,
                          bool *created, struct groom_diag *diag)
 {
     char id[STORE_ID_SIZE], hash[STORE_HASH_SIZE];
-    struct store_job_new row = {.id = id, .kind = request->kind, .request = request->inputs,
+    struct store_webhook_new webhooks[2];
+    struct store_job_new row = {.webhooks = webhooks, .n_webhooks = list_webhooks(jobs, request, webhooks), .id = id, .kind = request->kind, .request = request->inputs,
                                 .options = request->options, .priority = request->priority,
                                 .idempotency_key = request->idempotency_key, .request_hash = hash};
     char present[STORE_ID_SIZE];

@@ -27,6 +27,7 @@ struct jobs_request {
     const char *inputs;          /* JSON object of ids: {"strands":"str_…","head":"head_…"} */
     const char *options;         /* JSON object, complete */
     int32_t priority;
+    const struct store_webhook_new *webhook; /* who is told of its end, or NULL */
     const char *idempotency_key; /* or NULL */
 };
 
@@ -35,6 +36,8 @@ struct jobs_request {
  * returns  GROOM_ECONFLICT: the key stands for another request (HTTP 422) */
 GROOM_MUST_CHECK groom_status jobs_submit(struct jobs *jobs, const struct jobs_request *request,
                                           struct store_job *job, bool *created, struct groom_diag *diag);
+/* Who is told of every job's end besides; the texts are borrowed and outlive the jobs. Before any is submitted. */
+void jobs_set_webhook(struct jobs *jobs, const struct store_webhook_new *webhook);
 /* returns  GROOM_ENOTFOUND */
 GROOM_MUST_CHECK groom_status jobs_get(struct jobs *jobs, const char *id, struct store_job *job,
                                        struct groom_diag *diag);

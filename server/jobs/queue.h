@@ -16,6 +16,7 @@ struct jobs_watch {
 struct jobs {
     struct store *store;
     struct blobs *blobs;
+    struct store_webhook_new webhook; /* url NULL: none */
     char shared_blobs[1024];      /* where workers see the folder of blobs; "": they do not */
     pthread_mutex_t lock;         /* of what follows; never held while the store is asked */
     struct jobs_watch *watches;

@@ -128,6 +128,9 @@ groom_status quality_insert(struct connection *c, const struct store_quality *ke
                             struct groom_diag *diag);
 groom_status event_append(struct connection *c, const char *job_id, const char *type, const char *data,
                           int64_t now, struct groom_diag *diag);
+groom_status webhook_insert(struct connection *c, const char *job_id, const struct store_webhook_new *webhook,
+                            int64_t now, struct groom_diag *diag);
+groom_status webhooks_release(struct connection *c, const char *job_id, int64_t now, struct groom_diag *diag);
 /* The limit of a page, one more than asked for, so that a next page shows itself. */
 int64_t page_limit(struct store_page page);
 int64_t page_before(struct store_page page);

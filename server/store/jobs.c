@@ -74,6 +74,8 @@ static groom_status insert_job(struct connection *c, const struct store_job_new 
     groom_status status = query_run(&q, NULL);
     if (status == GROOM_OK && job->idempotency_key)
         status = insert_key(c, job, now, diag);
+    for (size_t i = 0; status == GROOM_OK && i < job->n_webhooks; i++)
+        status = webhook_insert(c, job->id, &job->webhooks[i], now, diag);
     return status == GROOM_OK ? event_append(c, job->id, "state", "{\"state\":\"queued\"}", now, diag) : status;
 }
 

@@ -203,6 +203,8 @@ static groom_status write_move(struct connection *c, const struct store_job_move
     if (status == GROOM_OK)
         status = append_state_event(c, move, present.attempt, now, diag);
     if (status == GROOM_OK && store_job_state_is_end(move->to))
+        status = webhooks_release(c, move->job_id, now, diag);
+    if (status == GROOM_OK && store_job_state_is_end(move->to))
         status = drop_checkpoint(c, move->job_id, garbage, diag);
     return status;
 }

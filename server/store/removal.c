@@ -3,6 +3,21 @@
 
 #include "server/store/database.h"
 
+static groom_status run_for(struct connection *c, const char *sql, const char *id, int64_t *n_changed,
+                            struct groom_diag *diag)
+{
+    struct query q = query_open(c, sql, diag);
+    query_text(&q, 1, id);
+    return query_run(&q, n_changed);
+}
+
+/* Reports that compare it with something, or something with it. */
+static groom_status delete_qualities(struct connection *c, const char *id, struct groom_diag *diag)
+{
+    return run_for(c, "DELETE FROM qualities WHERE subject = ?1 OR target = ?1 OR target LIKE ?1 || '/%'", id, NULL,
+                   diag);
+}
+
 /* --- uploads ------------------------------------------------------------------------------ */
 
 /* Jobs that have not ended read their inputs again with each attempt. */
@@ -47,6 +62,8 @@ groom_status store_asset_remove(struct store *store, enum store_asset_kind kind,
         return status;
     if ((status = delete_asset(c, kind, id, sha256, diag)) == GROOM_OK)
         status = check_unused(c, id, diag);
+    if (status == GROOM_OK)
+        status = delete_qualities(c, id, diag);
     if ((status = transaction_end(c, status, diag)) == GROOM_OK)
         memcpy(garbage, sha256, STORE_HASH_SIZE);
     return status;
@@ -66,14 +83,6 @@ static groom_status delete_arrays(struct connection *c, const char *id, struct g
     return query_run(&arrays, NULL);
 }
 
-static groom_status run_for(struct connection *c, const char *sql, const char *id, int64_t *n_changed,
-                            struct groom_diag *diag)
-{
-    struct query q = query_open(c, sql, diag);
-    query_text(&q, 1, id);
-    return query_run(&q, n_changed);
-}
-
 static groom_status delete_groom(struct connection *c, const char *id, struct groom_diag *diag)
 {
     int64_t n_changed = 0;
@@ -87,6 +96,8 @@ static groom_status delete_groom(struct connection *c, const char *id, struct gr
         status = run_for(c, "DELETE FROM qualities WHERE subject = ?1", id, NULL, diag);
     if (status == GROOM_OK)
         status = run_for(c, "DELETE FROM revisions WHERE groom_id = ?1", id, NULL, diag);
+    if (status == GROOM_OK)
+        status = delete_qualities(c, id, diag);
     if (status == GROOM_OK)
         status = run_for(c, "DELETE FROM grooms WHERE id = ?1", id, &n_changed, diag);
     if (status == GROOM_OK && n_changed == 0)

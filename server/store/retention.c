@@ -51,6 +51,7 @@ static groom_status retire_jobs(struct connection *c, int64_t before, uint32_t m
                                          "DELETE FROM losses WHERE job_id IN " THOSE,
                                          "DELETE FROM checkpoints WHERE job_id IN " THOSE,
                                          "DELETE FROM idempotency_keys WHERE job_id IN " THOSE,
+                                         "DELETE FROM webhooks WHERE job_id IN " THOSE,
                                          "DELETE FROM attempts WHERE job_id IN " THOSE,
                                          "DELETE FROM jobs WHERE id IN " THOSE};
     groom_status status = GROOM_OK;

@@ -91,7 +91,17 @@ static const char version_6[] =
     "  subject TEXT NOT NULL, number INTEGER NOT NULL, target TEXT NOT NULL, report TEXT NOT NULL,"
     "  created INTEGER NOT NULL, PRIMARY KEY (subject, number, target)) STRICT, WITHOUT ROWID;";
 
-const char *const schema_steps[] = {version_1, version_2, version_3, version_4, version_5, version_6};
+/* who is told of a job's end; due 0: it has not ended */
+static const char version_7[] =
+    "CREATE TABLE webhooks ("
+    "  id TEXT NOT NULL PRIMARY KEY, job_id TEXT NOT NULL REFERENCES jobs (id), url TEXT NOT NULL,"
+    "  secret TEXT NOT NULL, state INTEGER NOT NULL DEFAULT 0, attempts INTEGER NOT NULL DEFAULT 0,"
+    "  due INTEGER NOT NULL DEFAULT 0, last_status INTEGER NOT NULL DEFAULT 0,"
+    "  last_error TEXT NOT NULL DEFAULT '', created INTEGER NOT NULL, finished INTEGER NOT NULL DEFAULT 0) STRICT;"
+    "CREATE INDEX webhooks_by_job ON webhooks (job_id);"
+    "CREATE INDEX webhooks_due ON webhooks (due) WHERE state = 0;";
+
+const char *const schema_steps[] = {version_1, version_2, version_3, version_4, version_5, version_6, version_7};
 const int schema_version = sizeof schema_steps / sizeof schema_steps[0];
 
 static groom_status read_version(sqlite3 *db, int *version, struct groom_diag *diag)

@@ -272,6 +272,11 @@ struct store_job_list {
     int64_t next;
 };
 
+/* Somebody who is to be told of a job's end; everything borrowed. */
+struct store_webhook_new {
+    const char *url, *secret;
+};
+
 struct store_job_new {
     const char *id; /* from store_make_id */
     const char *kind;
@@ -279,6 +284,8 @@ struct store_job_new {
     int32_t priority;
     const char *idempotency_key;   /* or NULL */
     const char *request_hash;      /* of what the key stands for; with a key only */
+    const struct store_webhook_new *webhooks; /* or NULL */
+    size_t n_webhooks;
 };
 
 /* Queue a job, unless its idempotency key is known: then *id is that job's and *created false.
@@ -431,6 +438,43 @@ struct store_job_move {
  *          GROOM_ENOTFOUND, and what store_groom_create returns */
 GROOM_MUST_CHECK groom_status store_job_move(struct store *store, const struct store_job_move *move,
                                              char garbage[STORE_HASH_SIZE], struct groom_diag *diag);
+
+/* --- messages of a job's end ------------------------------------------------------------------------ */
+
+/* Made with the job, due from its end on (in the transaction that ends it), until it is delivered or given up. */
+enum store_webhook_state { STORE_WEBHOOK_WAITING, STORE_WEBHOOK_DELIVERED, STORE_WEBHOOK_GIVEN_UP, STORE_WEBHOOK_STATES };
+const char *store_webhook_state_name(enum store_webhook_state state); /* "given_up" */
+
+struct store_webhook {
+    char id[STORE_ID_SIZE]; /* "msg_…": the same for every try */
+    char job_id[STORE_ID_SIZE];
+    char *url, *secret;
+    enum store_webhook_state state;
+    uint32_t n_attempts;
+    int64_t due_ms;  /* the next try; 0: its job has not ended */
+    int last_status; /* HTTP; 0: none was answered */
+    char *last_error;
+    int64_t created_ms, finished_ms;
+};
+
+struct store_webhook_list {
+    struct store_webhook *items;
+    size_t n;
+};
+
+/* One that is due, for lease_ms: whoever dies with it leaves it to be tried again. *taken false: none is. */
+GROOM_MUST_CHECK groom_status store_webhook_take(struct store *store, int64_t lease_ms,
+                                                 struct store_webhook *webhook, bool *taken,
+                                                 struct groom_diag *diag);
+/* What came of it; due_ms: of the next try where it goes on waiting. */
+GROOM_MUST_CHECK groom_status store_webhook_tried(struct store *store, const char *id,
+                                                  enum store_webhook_state state, int64_t due_ms, int last_status,
+                                                  const char *last_error, struct groom_diag *diag);
+/* All of a job. */
+GROOM_MUST_CHECK groom_status store_webhooks_list(struct store *store, const char *job_id,
+                                                  struct store_webhook_list *list, struct groom_diag *diag);
+void store_webhook_finish(struct store_webhook *webhook);
+void store_webhook_list_finish(struct store_webhook_list *list);
 
 /* --- events and losses ---------------------------------------------------------------------------------- */
 

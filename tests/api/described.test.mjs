@@ -60,6 +60,7 @@ test('every operation answers as it is described', async (t) => {
   assert.ok((await events(daemon, `/v1/jobs/${job.id}/events`)).length > 3);
   await get(`/v1/jobs/${job.id}/events?after=100000`, 204);
   await get(`/v1/jobs/${job.id}/losses`);
+  await get(`/v1/jobs/${job.id}/deliveries`);
   const failing = await submit(daemon);
   const second = await daemon.attempt();
   await expect(daemon, 204, 'POST', '/v1/work/ended', { token: second, body: { words: 'going' } });
