@@ -229,42 +229,77 @@ struct sculpt_batch {
     double (*q[STRANDS_A_PIECE])[3];
 };
 
-/* Strands that need more than the first iterations have targets they can hardly reach, with many minima:
- * go on from where they are, then come from the start again by smaller turns; the best is kept. */
-static void take_road(const struct sculpt_job *job, struct sculpt_space *space, const struct sculpt_batch *first,
-                      struct lane_output *best, const uint32_t *hard, uint32_t n_hard, uint32_t road)
+/* Strands that took long have targets they can hardly reach, and many minima: they go on from where they are;
+ * then come from the start again by smaller turns; then from the start with a stiffness so high that there is one
+ * minimum, which is followed while the stiffness falls to what it should be. The best is kept. */
+enum road { ROAD_ON, ROAD_SMALL_TURNS, ROAD_FALLING_STIFFNESS, N_ROADS };
+
+#define LONG_SHARE 0.66         /* of the first iterations: more than that is long */
+#define SMALL_TURNS 0.27        /* of the usual cap */
+#define FIRST_STIFFNESS 1000.0  /* times what it should be */
+#define STIFFNESS_FALL 5.0
+#define FALL_STEPS 20           /* at each stiffness on the way */
+
+/* `again` begins where the strand is at the last of the stiffnesses above its own. */
+static void follow_stiffness(struct sculpt_space *space, const struct sculpt_batch *first, struct sculpt_batch *again,
+                             const uint32_t *hard, const struct sculpt_settings *settings)
 {
-    static const double share_of_cap[3] = {1.0, 0.27, 0.13};
+    struct sculpt_settings few = *settings;
+    few.n_steps = FALL_STEPS;
+    for (double factor = FIRST_STIFFNESS; factor > 1.0; factor /= STIFFNESS_FALL) {
+        for (uint32_t i = 0; i < again->n; i++)
+            again->in[i].c = first->in[hard[i]].c * factor;
+        sculpt_group_solve(space->group, again->in, again->n, &few, again->q, again->out);
+        for (uint32_t i = 0; i < again->n; i++)
+            again->in[i].q = (const double (*)[3])again->q[i];
+    }
+    for (uint32_t i = 0; i < again->n; i++)
+        again->in[i].c = first->in[hard[i]].c;
+}
+
+static void take_road(const struct sculpt_job *job, struct sculpt_space *space, const struct sculpt_batch *first,
+                      struct lane_output *best, const uint32_t *hard, uint32_t n_hard, enum road road)
+{
     struct sculpt_batch again = {.n = n_hard};
     struct sculpt_settings settings = {.n_steps = 10 * job->options->max_iterations, .tolerance = job->options->tolerance,
-                                       .most_turning = job->options->most_turning * share_of_cap[road]};
+                                       .most_turning = job->options->most_turning};
+    if (road == ROAD_SMALL_TURNS)
+        settings.most_turning *= SMALL_TURNS;
     for (uint32_t i = 0; i < n_hard; i++) {
         again.in[i] = first->in[hard[i]];
         again.q[i] = space->detour + (size_t)i * space->max_elements;
-        if (road == 0)
+        if (road == ROAD_ON)
             again.in[i].q = (const double (*)[3])first->q[hard[i]];
     }
+    if (road == ROAD_FALLING_STIFFNESS)
+        follow_stiffness(space, first, &again, hard, &settings);
     sculpt_group_solve(space->group, again.in, n_hard, &settings, again.q, again.out);
     for (uint32_t i = 0; i < n_hard; i++) {
         struct lane_output *o = &best[hard[i]];
         again.out[i].energy_before = o->energy_before;
         again.out[i].iterations += o->iterations;
         o->iterations = again.out[i].iterations;
-        if (!(again.out[i].energy < o->energy) && !(road == 0))
+        if (!(again.out[i].energy < o->energy) && road != ROAD_ON)
             continue;
         *o = again.out[i];
         memcpy(first->q[hard[i]], again.q[i], first->in[hard[i]].n * sizeof *again.q[i]);
     }
 }
 
+/* Did it take long? Some arrive in a minimum that is not the best one to be had. */
+static int is_hard(const struct sculpt_job *job, const struct lane_output *o)
+{
+    return o->active || o->iterations > job->options->max_iterations * LONG_SHARE;
+}
+
 static void take_roads(const struct sculpt_job *job, struct sculpt_space *space, struct sculpt_batch *batch)
 {
     uint32_t hard[STRANDS_A_PIECE], n_hard = 0;
     for (uint32_t k = 0; k < batch->n; k++)
-        if (batch->out[k].active)
+        if (is_hard(job, &batch->out[k]))
             hard[n_hard++] = k;
-    for (uint32_t road = 0; road < job->options->n_roads && road < 3 && n_hard > 0; road++)
-        take_road(job, space, batch, batch->out, hard, n_hard, road);
+    for (uint32_t road = 0; road < job->options->n_roads && road < N_ROADS && n_hard > 0; road++)
+        take_road(job, space, batch, batch->out, hard, n_hard, (enum road)road);
 }
 
 static void sculpt_piece(void *user, uint32_t piece, uint32_t thread)

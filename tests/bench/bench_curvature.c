@@ -159,6 +159,38 @@ static void bench_sculpt(uint32_t n_elements)
     groom_superhelices_destroy(h);
 }
 
+/* A lock of 2 000 strands in somebody's hand: each frame the anchors have moved on by some millimetres, the
+ * solver begins at the last result, and all strands are sampled for drawing. */
+static void bench_drag(const struct groom_context *context)
+{
+    enum { N = 2000, FRAMES = 30, VERTICES = 100 };
+    struct groom_superhelices *rest = superhelix_coils(N, 45, 1, 0), *now_at;
+    struct groom_sculpt_options options = groom_sculpt_options_default();
+    struct groom_sculpt_outcome *outcomes = calloc(N, sizeof *outcomes);
+    float(*points)[3] = calloc((size_t)N * VERTICES, sizeof *points);
+    size_t n_anchors;
+    struct groom_anchor *anchors = some_anchors(rest, &n_anchors);
+    double worst = 0.0, start = now(), iterations = 0.0;
+    options.n_roads = 0;
+    options.tolerance = 1e-5; /* the next frame goes on from here */
+    need(groom_superhelices_copy(rest, NULL, &now_at, NULL));
+    for (uint32_t frame = 0; frame < FRAMES; frame++) {
+        double begin = now();
+        for (size_t k = 0; k < n_anchors; k++)
+            anchors[k].position[frame / 10 % 3] += 0.003;
+        need(groom_superhelices_sculpt(now_at, (const double(*)[3])rest->q, anchors, n_anchors, &options, context, outcomes,
+                                       NULL));
+        need(groom_superhelices_sample(now_at, VERTICES, points, context, NULL));
+        worst = now() - begin > worst ? now() - begin : worst;
+        for (uint32_t i = 0; i < N; i++)
+            iterations += (double)outcomes[i].iterations / N / FRAMES;
+    }
+    printf("figure sculpt_drag_2000_seconds %.4f s a frame, two cores, 45 elements, 3 mm a frame, sampled at %d vertices; "
+           "%.1f iterations; the slowest frame %.4f s\n", (now() - start) / FRAMES, VERTICES, iterations, worst);
+    free(anchors), free(outcomes), free(points);
+    groom_superhelices_destroy(rest), groom_superhelices_destroy(now_at);
+}
+
 static void bench_ruffle(const struct groom_context *context)
 {
     enum { N = 100000 };
@@ -188,6 +220,21 @@ static void bench_analyze(const struct groom_context *context)
     groom_superhelices_destroy(h);
 }
 
+static void bench_clusters(const struct groom_context *context)
+{
+    enum { N = 100000, CLUSTERS = 32, FRAMES = 6 };
+    struct groom_strands *strands = coils_as_points(N, 100);
+    struct groom_clusters *clusters;
+    static struct groom_cluster_frame frames[CLUSTERS * FRAMES];
+    const double at[FRAMES] = {1.0 / 6, 2.0 / 6, 3.0 / 6, 4.0 / 6, 5.0 / 6, 1.0};
+    double start = now();
+    need(groom_strands_cluster(strands, CLUSTERS, 1, context, &clusters, NULL));
+    need(groom_clusters_frames(clusters, strands, at, FRAMES, context, frames, NULL));
+    printf("figure clusters_100k_seconds %.3f s 32 clusters, 6 frames each\n", now() - start);
+    groom_clusters_destroy(clusters);
+    groom_strands_destroy(strands);
+}
+
 int main(void)
 {
     struct groom_pool *pool;
@@ -199,6 +246,8 @@ int main(void)
     bench_ruffle(&context);
     bench_sculpt(45);
     bench_sculpt(90);
+    bench_drag(&context);
+    bench_clusters(&context);
     groom_pool_destroy(pool);
     return 0;
 }

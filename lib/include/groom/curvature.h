@@ -147,14 +147,15 @@ struct groom_anchor {
 struct groom_sculpt_options {
     double stiffness;        /* N c of Eq. 15 (metre^4, N the strand's elements): how little curvature may change */
     uint32_t max_iterations; /* of the first attempt */
-    uint32_t n_roads;        /* for strands that are not done then: 0 leave them; 1 go on, up to ten times as
-                                many; 2, 3 come again from the start by smaller turns, and keep the best */
+    uint32_t n_roads;        /* for strands that took two thirds of them or more: 0 leave them; 1 go on, up to ten
+                                times as many; 2 come again from the start by smaller turns; 3 and again by falling
+                                stiffness; the best is kept */
     uint32_t max_tail;       /* of a plain L-BFGS, for what still goes downhill after all that */
     double tolerance;        /* stop where a step promises less than this share of the energy */
     double most_turning;     /* radians that one step may turn a strand, over its length */
 };
 
-/* 30 iterations, 3 roads (a drag in progress can do with 0), a tail of 200, 1e-8, 1.5 rad; stiffness of the paper's c = 10 at 45 elements. */
+/* 30 iterations, 3 roads, a tail of 200, 1e-8, 1.5 rad (a drag in progress can do with 0 roads and 1e-5); stiffness of the paper's c = 10 at 45 elements. */
 struct groom_sculpt_options groom_sculpt_options_default(void);
 
 /* The paper's c is in cm^4 and grows with the count of elements; the stiffness here is c N, so that a
