@@ -137,6 +137,27 @@ static void pen_clusters(struct pen *pen, struct groom_fit *fit)
     pen_bytes(pen, fit->cluster_of, fit->n * sizeof *fit->cluster_of);
 }
 
+/* Numbers that a descent can move at most: a strand's and an operator guide's. */
+static uint64_t most_moments(const struct groom_fit *fit) { return (uint64_t)fit->n * GROOM_FIT_MAX_OPERATORS * 4; }
+
+static void pen_moments(struct pen *pen, struct groom_fit *fit)
+{
+    uint32_t n = fit->n_moments;
+    pen_u32(pen, &n);
+    if (pen->mode == READ && pen->status == GROOM_OK) {
+        if (n > most_moments(fit) || (size_t)(pen->end - pen->at) < n * sizeof *fit->moments) {
+            pen->status = GROOM_EFORMAT;
+            return;
+        }
+        if (n > 0 && !(fit->moments = memory_array(fit->allocator, n, sizeof *fit->moments))) {
+            pen->status = GROOM_ENOMEM;
+            return;
+        }
+        fit->n_moments = n;
+    }
+    pen_bytes(pen, fit->moments, fit->n_moments * sizeof *fit->moments);
+}
+
 static void pen_state(struct pen *pen, struct groom_fit *fit)
 {
     uint32_t has_groom = fit->groom != NULL, report_bytes = sizeof fit->report;
@@ -153,6 +174,7 @@ static void pen_state(struct pen *pen, struct groom_fit *fit)
     pen_u32(pen, &has_groom);
     if (has_groom && pen->status == GROOM_OK)
         pen_groom(pen, fit);
+    pen_moments(pen, fit);
     if (pen->mode == READ && pen->at != pen->end)
         pen->status = pen->status == GROOM_OK ? GROOM_EFORMAT : pen->status;
 }
@@ -233,6 +255,8 @@ static int sound_state(const struct groom_fit *fit)
         return 0;
     if (fit->groom && !sound_groom(fit))
         return 0;
+    if (!all_finite(fit->moments, fit->n_moments))
+        return 0;
     if (fit->stage > 0 && !(fit->groom && groom_validate(fit->groom, NULL) == GROOM_OK && fit->n_guides > 0))
         return 0;
     return fit->stage == FIT_N_STAGES || fit_stages[fit->stage].sound(fit);
@@ -242,7 +266,7 @@ static int sound_state(const struct groom_fit *fit)
 static uint64_t most_bytes(const struct groom_fit *fit)
 {
     uint64_t n = fit->n, points = n * fit->m * 12;
-    return 4096 + sizeof fit->report + 2 * points + n * (16 * 8 + 64 + GROOM_FIT_MAX_OPERATORS * 8);
+    return 4096 + sizeof fit->report + 2 * points + n * (16 * 8 + 64 + GROOM_FIT_MAX_OPERATORS * 24);
 }
 
 static groom_status read_all(const struct groom_source *source, unsigned char *bytes, uint64_t n)
@@ -280,9 +304,12 @@ static void adopt(struct groom_fit *fit, struct groom_fit *state)
 {
     memory_release(fit->allocator, fit->centroids, (size_t)fit->n_guides * fit->m, sizeof *fit->centroids);
     memory_release(fit->allocator, fit->cluster_of, fit->n, sizeof *fit->cluster_of);
+    memory_release(fit->allocator, fit->moments, fit->n_moments, sizeof *fit->moments);
     groom_destroy(fit->groom);
     *fit = *state;
     state->centroids = NULL;
+    state->moments = NULL;
+    state->n_moments = 0;
     state->cluster_of = NULL;
     state->groom = NULL;
 }
@@ -292,6 +319,8 @@ static groom_status parse(struct groom_fit *fit, const unsigned char *payload, u
     struct pen pen = {.mode = READ, .at = payload, .end = payload + n};
     struct groom_fit state = *fit;
     state.centroids = NULL;
+    state.moments = NULL;
+    state.n_moments = 0;
     state.cluster_of = NULL;
     state.groom = NULL;
     state.n_guides = 0;
@@ -303,6 +332,7 @@ static groom_status parse(struct groom_fit *fit, const unsigned char *payload, u
     else
         groom_fail_at(diag, pen.status, (int64_t)sizeof(struct checkpoint_header) + (pen.at - payload),
                       pen.status == GROOM_ENOMEM ? "no memory to load a checkpoint" : "the checkpoint is damaged");
+    memory_release(fit->allocator, state.moments, state.n_moments, sizeof *state.moments);
     memory_release(fit->allocator, state.centroids, (size_t)state.n_guides * fit->m, sizeof *state.centroids);
     memory_release(fit->allocator, state.cluster_of, fit->n, sizeof *state.cluster_of);
     groom_destroy(state.groom);

@@ -77,6 +77,7 @@ void groom_fit_destroy(struct groom_fit *fit)
     memory_release(allocator, fit->target, (size_t)fit->n * fit->m, sizeof *fit->target);
     memory_release(allocator, fit->centroids, (size_t)fit->n_guides * fit->m, sizeof *fit->centroids);
     memory_release(allocator, fit->cluster_of, fit->n, sizeof *fit->cluster_of);
+    memory_release(allocator, fit->moments, fit->n_moments, sizeof *fit->moments);
     groom_destroy(fit->groom);
     groom_scalp_destroy(fit->scalp);
     groom_bvh_destroy(fit->bvh);

@@ -95,6 +95,8 @@ const struct option_row options_table[] = {
     ROW(operators, batches_late, OPTION_U32, 50, 50, 50, 1, 10000, "Kernels of which the losses are measured; in a step of the paper's method, those of its last quarter."),
 
     {"/stages/randoms", OPTION_GROUP, 0, ALL(0), 0, 0, "The random numbers of each strand (Section 5.6)."},
+    ROW(randoms, method, OPTION_METHOD, 0, 0, 0, 0, 1,
+        "direct: values of each number's range are tried. paper: Adam on Eq. 19 with noise on its gradients (Eqs. 20, 21)."),
     ROW(randoms, rounds, OPTION_U32, 1, 2, 3, 0, 100,
         "Rounds over the operators' random numbers. 0 leaves them as they were drawn."),
     ROW(randoms, values, OPTION_U32, 64, 80, 128, 2, 10000,
@@ -117,6 +119,7 @@ const struct option_row options_table[] = {
 
 const size_t options_n_rows = sizeof options_table / sizeof options_table[0];
 const char *const options_quality_names[3] = {"draft", "standard", "high"};
+const char *const options_method_names[2] = {"direct", "paper"};
 
 const struct option_row *options_find(const char *path)
 {
@@ -144,6 +147,7 @@ static void set_default(const struct option_row *row, double value, struct groom
     case OPTION_REAL:
     case OPTION_REAL_OR_AUTO: *(double *)at = value; break;
     case OPTION_BOOLEAN: *(int *)at = value != 0; break;
+    case OPTION_METHOD: *(groom_fit_method *)at = (groom_fit_method)value; break;
     case OPTION_QUALITY: *(groom_fit_quality *)at = (groom_fit_quality)value; break;
     case OPTION_OPERATORS:
         options->operators_auto = 1;

@@ -16,6 +16,7 @@ enum option_type {
     OPTION_REAL_OR_AUTO,  /* "auto" is 0 */
     OPTION_BOOLEAN,
     OPTION_QUALITY,
+    OPTION_METHOD,
     OPTION_OPERATORS,
     OPTION_CAMERAS
 };
@@ -39,5 +40,6 @@ const struct option_row *options_find(const char *path);
 const char *options_member(const char *path, const char *group);
 
 extern const char *const options_quality_names[3];
+extern const char *const options_method_names[2];
 
 #endif

@@ -97,6 +97,17 @@ static groom_status parse_quality(const cJSON *json, groom_fit_quality *quality,
     return groom_fail_field(diag, GROOM_EINVAL, "/quality", "quality must be \"draft\", \"standard\" or \"high\"");
 }
 
+static groom_status parse_method(const cJSON *json, const struct option_row *row, groom_fit_method *method,
+                                 struct groom_diag *diag)
+{
+    for (int i = 0; i < 2; i++)
+        if (cJSON_IsString(json) && strcmp(json->valuestring, options_method_names[i]) == 0) {
+            *method = (groom_fit_method)i;
+            return GROOM_OK;
+        }
+    return groom_fail_field(diag, GROOM_EINVAL, row->path, "%s must be \"direct\" or \"paper\"", row->path + 1);
+}
+
 static groom_status parse_operators(const cJSON *json, struct groom_fit_options *options, struct groom_diag *diag)
 {
     const cJSON *item;
@@ -152,6 +163,7 @@ static groom_status parse_value(const cJSON *json, const struct option_row *row,
     case OPTION_GROUP: return parse_group(json, row->path, options, diag);
     case OPTION_GROUP_OR_NULL: return cJSON_IsNull(json) ? GROOM_OK : parse_group(json, row->path, options, diag);
     case OPTION_BOOLEAN: return parse_boolean(json, row, at, diag);
+    case OPTION_METHOD: return parse_method(json, row, at, diag);
     case OPTION_QUALITY: return parse_quality(json, at, diag);
     case OPTION_OPERATORS: return parse_operators(json, options, diag);
     case OPTION_CAMERAS: return parse_cameras(json, options, diag);

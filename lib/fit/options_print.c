@@ -78,6 +78,7 @@ static cJSON *value_json(const struct groom_fit_options *options, const struct o
     case OPTION_REAL: return number_or_auto(*(const double *)at, 0);
     case OPTION_REAL_OR_AUTO: return number_or_auto(*(const double *)at, 1);
     case OPTION_BOOLEAN: return cJSON_CreateBool(*(const int *)at);
+    case OPTION_METHOD: return cJSON_CreateString(options_method_names[*(const groom_fit_method *)at]);
     case OPTION_QUALITY: return cJSON_CreateString(options_quality_names[options->quality]);
     case OPTION_OPERATORS: return options->operators_auto ? cJSON_CreateString("auto") : operators_json(options);
     case OPTION_CAMERAS: return cameras_json(options);
@@ -156,6 +157,7 @@ static cJSON *names_schema(const char *(*name)(int), int n)
 }
 
 static const char *operator_name(int i) { return groom_operator_name((groom_operator_type)i); }
+static const char *method_name(int i) { return options_method_names[i]; }
 static const char *quality_name(int i) { return options_quality_names[i]; }
 
 static int put_operators(cJSON *schema)
@@ -222,6 +224,7 @@ static int put_kind(cJSON *schema, const struct option_row *row)
     case OPTION_U32_OR_AUTO: return put_number_or_auto(schema, row, "integer");
     case OPTION_REAL_OR_AUTO: return put_number_or_auto(schema, row, "number");
     case OPTION_BOOLEAN: return put_text(schema, "type", "boolean");
+    case OPTION_METHOD: return absorb(schema, names_schema(method_name, 2));
     case OPTION_QUALITY: return absorb(schema, names_schema(quality_name, 3));
     case OPTION_OPERATORS: return put_operators(schema);
     case OPTION_CAMERAS: return put_cameras(schema);

@@ -9,7 +9,9 @@
  *
  * A strand may also follow another operator guide near it, whose curl or clump it belongs to by its looks,
  * and at the end of a round its numbers and instancing weights take Newton's steps together
- * (random_polish.c). */
+ * (random_polish.c).
+ *
+ * method "paper" is the paper's own, as a reference (paper_randoms.h). */
 #include <math.h>
 #include <string.h>
 
@@ -17,6 +19,7 @@
 #include "base/progress.h"
 #include "fit/gather.h"
 #include "fit/loss_strands.h"
+#include "fit/paper_randoms.h"
 #include "fit/random_search.h"
 
 #define UNIT 0.1             /* metres on an ordinary head: what the paper's weights were made for */
@@ -334,6 +337,28 @@ static groom_status report_losses(struct groom_fit *fit, uint64_t iteration, con
 
 /* --- the stage ---------------------------------------------------------------------------------------------- */
 
+static int is_paper(const struct groom_fit *fit) { return fit->options.stages.randoms.method == GROOM_FIT_PAPER; }
+
+/* The paper's method: one phase of gradient steps between two measurements. */
+static groom_status paper_step(struct groom_fit *fit, int *ended, const struct groom_context *context,
+                               struct groom_diag *diag)
+{
+    uint32_t n = fit->options.stages.randoms.iterations;
+    groom_status st = GROOM_OK;
+    if (n == 0 || paper_randoms_moments(fit) == 0) {
+        *ended = 1;
+        return GROOM_OK;
+    }
+    if (fit->phase == 1 && fit->iteration < n)
+        return paper_randoms_step(fit, context, diag);
+    if ((st = report_losses(fit, fit->phase * n, context, diag)) != GROOM_OK)
+        return st;
+    fit->phase++;
+    fit->iteration = 0;
+    *ended = fit->phase == 2;
+    return GROOM_OK;
+}
+
 /* Phase 0 measures; then comes each pass; each round ends with a measurement. */
 groom_status randoms_step(struct groom_fit *fit, int *ended, const struct groom_context *context,
                           struct groom_diag *diag)
@@ -341,6 +366,8 @@ groom_status randoms_step(struct groom_fit *fit, int *ended, const struct groom_
     struct pass passes[MOST_PASSES];
     uint32_t n = list_passes(fit, passes);
     groom_status st = GROOM_OK;
+    if (is_paper(fit))
+        return paper_step(fit, ended, context, diag);
     if (fit->phase == 0) {
         if (n > 0)
             st = report_losses(fit, 0, context, diag);
@@ -364,16 +391,31 @@ double randoms_fraction(const struct groom_fit *fit)
 {
     struct pass passes[MOST_PASSES];
     uint32_t n = fit->groom ? list_passes(fit, passes) : 0;
+    if (is_paper(fit))
+        return fit->iteration / fmax(fit->options.stages.randoms.iterations, 1);
     if (n == 0 || fit->phase == 0)
         return 0;
     return fmin((fit->phase - 1 + (double)fit->iteration / size_of(fit, &passes[fit->phase - 1])) / n, 1);
+}
+
+/* Moments belong to steps that are under way. */
+static int sound_paper(const struct groom_fit *fit)
+{
+    uint32_t n = fit->options.stages.randoms.iterations;
+    int under_way = fit->phase == 1 && fit->iteration > 0 && fit->iteration < n;
+    return fit->phase <= 1 && fit->iteration <= fit->phase * n &&
+           fit->n_moments == (under_way ? paper_randoms_moments(fit) : 0);
 }
 
 int randoms_sound(const struct groom_fit *fit)
 {
     struct pass passes[MOST_PASSES];
     uint32_t n = list_passes(fit, passes);
-    if (fit->groom->n_operators > GROOM_FIT_MAX_OPERATORS || fit->phase > n)
+    if (fit->groom->n_operators > GROOM_FIT_MAX_OPERATORS)
+        return 0;
+    if (is_paper(fit))
+        return sound_paper(fit);
+    if (fit->phase > n || fit->n_moments != 0)
         return 0;
     return fit->phase == 0 ? fit->iteration == 0 : fit->iteration <= size_of(fit, &passes[fit->phase - 1]);
 }

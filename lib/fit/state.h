@@ -30,6 +30,8 @@ struct groom_fit {
     float (*centroids)[3];            /* [n_guides * m] of clusters, not smoothed, in the target's frame */
     uint32_t *cluster_of;             /* [n] */
     struct groom *groom;              /* NULL until there are guides */
+    uint32_t n_moments;               /* of a gradient descent under way: see fit/adam.h; 0: there is none */
+    float *moments;                   /* [n_moments] */
     struct groom_fit_report report;
 };
 

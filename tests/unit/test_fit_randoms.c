@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fit/gradient_strands.h"
 #include "fit/loss_strands.h"
 #include "fit/state.h"
 #include "fit/strand_error.h"
@@ -88,7 +89,7 @@ static struct groom_fit *fit_of(const struct groom_sample *sample, uint32_t roun
 {
     struct groom_fit_options options;
     groom_fit_options_init(GROOM_FIT_STANDARD, &options);
-    options.vertices = M;
+    options.vertices = sample->truth->n_vertices;
     options.guides = sample->truth->n_guides;
     options.operator_guides = sample->truth->n_operator_guides;
     options.seed = 77;
@@ -253,8 +254,118 @@ START_TEST(no_rounds_leave_the_numbers_as_they_were_drawn)
 }
 END_TEST
 
+/* --- the paper's method --------------------------------------------------------------------- */
+
+/* Eq. 19's gradient is what differences say it is. */
+START_TEST(the_papers_gradient_is_that_of_its_loss)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_WAVY, 40, M, 3, NULL);
+    struct groom_fit *fit = fit_of(sample, 1);
+    struct gradient_strands *strands;
+    struct groom_gradient *gradient, *other;
+    double loss, up, down, h = 5e-4;
+    ck_ok(gradient_strands_create(fit, NULL, &strands, NULL));
+    ck_ok(groom_gradient_create(fit->groom, NULL, &gradient, NULL));
+    ck_ok(groom_gradient_create(fit->groom, NULL, &other, NULL));
+    ck_ok(gradient_strands_evaluate(strands, gradient, &loss, NULL, NULL));
+    for (uint32_t o = 0; o < fit->groom->n_operators; o++)
+        for (uint32_t r = 0; r < groom_operator_random_arrays(fit->groom->operators[o].type); r++) {
+            const float *slopes = gradient->operators[o].random[r];
+            uint32_t steepest = 0; /* of the first few: floats tell its differences best */
+            for (uint32_t i = 1; i < 4; i++)
+                steepest = fabsf(slopes[i]) > fabsf(slopes[steepest]) ? i : steepest;
+            float *u = &fit->groom->operators[o].random[r][steepest], kept = *u, slope = slopes[steepest];
+            *u = kept + (float)h;
+            ck_ok(gradient_strands_evaluate(strands, other, &up, NULL, NULL));
+            *u = kept - (float)h;
+            ck_ok(gradient_strands_evaluate(strands, other, &down, NULL, NULL));
+            *u = kept;
+            ck_assert_double_eq_tol((double)slope, (up - down) / (2 * h), 0.03 * fabs((double)slope) + 0.05);
+        }
+    groom_gradient_destroy(gradient);
+    groom_gradient_destroy(other);
+    gradient_strands_destroy(strands);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
+static struct groom_fit *paper_fit(const struct groom_sample *sample, uint32_t iterations)
+{
+    struct groom_fit *fit = fit_of(sample, 1);
+    fit->options.stages.randoms.method = GROOM_FIT_PAPER;
+    fit->options.stages.randoms.iterations = iterations;
+    return fit;
+}
+
+START_TEST(the_papers_steps_go_down)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_BENT, 60, M, 3, NULL);
+    struct groom_fit *fit = paper_fit(sample, 150);
+    finish(fit, NULL);
+    ck_assert_double_lt(loss_of(fit, "L_rand")->after, 0.6 * loss_of(fit, "L_rand")->before);
+    ck_assert_uint_eq(fit->n_moments, 0);
+    ck_ok(groom_validate(fit->groom, NULL));
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
+/* 2 000 strands: 30 gradients a step. */
+START_TEST(the_papers_steps_can_be_interrupted_and_know_no_threads)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_SHORT, 2000, 12, 3, NULL);
+    struct groom_fit *whole = paper_fit(sample, 50), *other = paper_fit(sample, 50);
+    struct groom_context context = three_threads();
+    struct bytes bytes = {0};
+    struct groom_memory_source memory;
+    finish(whole, &context);
+    for (int steps = 0; steps < 2; steps++) /* a measurement, and the first 30 */
+        ck_ok(groom_fit_step(other, NULL, NULL));
+    ck_assert_uint_eq(other->iteration, 30);
+    ck_ok(groom_fit_save(other, (struct groom_sink){append, &bytes}, NULL));
+    struct groom_source source = groom_source_from_memory(&memory, bytes.at, bytes.n);
+    struct groom_fit *next = paper_fit(sample, 50);
+    ck_ok(groom_fit_load(next, &source, NULL, NULL));
+    finish(next, NULL);
+    same_grooms(whole->groom, next->groom);
+    free(bytes.at);
+    groom_fit_destroy(whole);
+    groom_fit_destroy(other);
+    groom_fit_destroy(next);
+    groom_sample_destroy(sample);
+    groom_pool_destroy(context.pool);
+}
+END_TEST
+
+START_TEST(the_papers_steps_without_memory_change_nothing)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_STRAIGHT, 40, M, 3, NULL);
+    struct groom_fit *whole = paper_fit(sample, 3), *poor = paper_fit(sample, 3);
+    struct test_failing_allocator state;
+    struct groom_allocator allocator;
+    struct groom_context context = {.allocator = &allocator};
+    size_t fail_at = 0, failures = 0;
+    finish(whole, NULL);
+    while (!groom_fit_done(poor)) {
+        test_failing_allocator_init(&state, fail_at, &allocator);
+        groom_status st = groom_fit_step(poor, &context, NULL);
+        ck_assert_uint_eq(state.outstanding_bytes, 0);
+        failures += st != GROOM_OK;
+        fail_at = st == GROOM_OK ? 0 : fail_at + 1;
+    }
+    ck_assert_uint_gt(failures, 10);
+    same_grooms(whole->groom, poor->groom);
+    groom_fit_destroy(whole);
+    groom_fit_destroy(poor);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
 TEST_SUITE("fit_randoms", the_error_is_none_on_the_same_curve_however_its_vertices_stand,
            the_error_has_the_same_bits_in_all_variants, the_losses_are_those_of_their_equation,
            numbers_of_bent_hair_are_found, numbers_of_spiky_hair_are_found, numbers_of_curls_are_found,
            the_stage_has_the_same_bits_for_any_threads, the_stage_can_be_interrupted_anywhere,
-           a_step_without_memory_changes_nothing, no_rounds_leave_the_numbers_as_they_were_drawn)
+           a_step_without_memory_changes_nothing, no_rounds_leave_the_numbers_as_they_were_drawn,
+           the_papers_gradient_is_that_of_its_loss, the_papers_steps_go_down,
+           the_papers_steps_can_be_interrupted_and_know_no_threads, the_papers_steps_without_memory_change_nothing)

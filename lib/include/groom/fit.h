@@ -40,6 +40,12 @@ typedef enum groom_fit_quality {
     GROOM_FIT_HIGH
 } groom_fit_quality;
 
+/* How a stage is gone through. */
+typedef enum groom_fit_method {
+    GROOM_FIT_DIRECT, /* as this library does it */
+    GROOM_FIT_PAPER   /* the recipe of Chang et al. 2025, as a reference: its steps of gradient descent */
+} groom_fit_method;
+
 /* Plain data: copy it, keep it. Each member's name, default, range and meaning stand in one table
  * (lib/fit/options.c) from which defaults, parsing, printing and the JSON Schema are made.
  * The paths in JSON are the members': /stages/initialize/lambda_smooth. */
@@ -93,6 +99,7 @@ struct groom_fit_options {
             uint32_t batches, batches_late; /* 5, and 50 in the last quarter */
         } operators;
         struct {
+            groom_fit_method method;
             uint32_t rounds;            /* over the chain; 0 leaves the numbers as they were drawn */
             uint32_t values;            /* of a strand's number that are tried over its range */
             uint32_t strands;           /* of an operator guide that are asked about its curl */
