@@ -25,6 +25,9 @@ GROOM_MUST_CHECK groom_status assign_out_of_head(struct groom *groom, const stru
                                                  const struct groom_context *context, struct assign_counts *counts,
                                                  struct groom_diag *diag);
 
+/* The strongest clump of the chain, 1 at least if there is any: what pulls strands across. 0: nothing does. */
+float assign_clump_profile(const struct groom *groom);
+
 /* How many vertices of a polyline, the root left out, are more than `clearance` inside the head. A way
  * in through an opening of the mesh does not count. */
 uint32_t assign_buried(const struct groom_bvh *head, const float (*points)[3], uint32_t n, float clearance);

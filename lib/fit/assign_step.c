@@ -6,8 +6,7 @@
 
 #define STEP_STRANDS 20000
 
-/* The strongest clump of the chain, 1 at least if there is any: what pulls strands across. 0: nothing does. */
-static float clump_profile(const struct groom *groom)
+float assign_clump_profile(const struct groom *groom)
 {
     float profile = 0;
     for (uint32_t i = 0; i < groom->n_operators; i++)
@@ -36,7 +35,7 @@ static groom_status assign_some(struct groom_fit *fit, float profile, const stru
 groom_status assign_step(struct groom_fit *fit, int *ended, const struct groom_context *context,
                          struct groom_diag *diag)
 {
-    float profile = clump_profile(fit->groom);
+    float profile = assign_clump_profile(fit->groom);
     if (fit->bvh && profile > 0) {
         groom_status st = assign_some(fit, profile, context, diag);
         if (st != GROOM_OK || fit->iteration < fit->n)

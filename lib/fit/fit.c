@@ -6,6 +6,7 @@
 #include "base/progress.h"
 #include "fit/checksum.h"
 #include "fit/state.h"
+#include "fit/unseen.h"
 #include "groom/mesh.h"
 #include "groom/strands.h"
 
@@ -58,8 +59,6 @@ groom_status groom_fit_create(const struct groom_strands *strands, const struct 
         goto out;
     if ((st = checksum_inputs(fit, strands, head, diag)) != GROOM_OK)
         goto out;
-    if (fit->options.n_cameras > 0)
-        report_note(&fit->report, "Cameras were read; the stages of this version use all strands, seen or not.");
     *out = fit;
     fit = NULL;
 out:
@@ -75,6 +74,7 @@ void groom_fit_destroy(struct groom_fit *fit)
     memory_release(allocator, fit->roots, fit->n, sizeof *fit->roots);
     memory_release(allocator, fit->root_uv, fit->n, sizeof *fit->root_uv);
     memory_release(allocator, fit->target, (size_t)fit->n * fit->m, sizeof *fit->target);
+    unseen_finish(fit);
     memory_release(allocator, fit->centroids, (size_t)fit->n_guides * fit->m, sizeof *fit->centroids);
     memory_release(allocator, fit->cluster_of, fit->n, sizeof *fit->cluster_of);
     memory_release(allocator, fit->moments, fit->n_moments, sizeof *fit->moments);
@@ -128,5 +128,5 @@ groom_status groom_fit_result(const struct groom_fit *fit, const struct groom_co
 {
     if (fit->stage == 0)
         return groom_fail(diag, GROOM_EINVAL, "stage %s has not ended: there is no groom yet", fit_stages[0].name);
-    return groom_clone(fit->groom, context, groom, diag);
+    return fit->all.n ? unseen_restore(fit, context, groom, diag) : groom_clone(fit->groom, context, groom, diag);
 }

@@ -26,6 +26,8 @@ const struct option_row options_table[] = {
      "What the capture was seen by: strands that no camera sees leave the losses of the stages."},
     {"/visibility/cameras", OPTION_CAMERAS, AT(cameras), ALL(0), 0, GROOM_FIT_MAX_CAMERAS,
      "Pinhole cameras: pixels and metres, world to camera, x right, y down, z forward."},
+    {"/visibility/least_seen", OPTION_REAL, AT(least_seen), ALL(0.1), 0, 1,
+     "Share of a strand's vertices that some camera must see; strands of which less is seen leave the losses."},
     {"/stages", OPTION_GROUP, 0, ALL(0), 0, 0, "The hyperparameters of each stage."},
 
 #define ROW(stage, member, type, draft, standard, high, minimum, maximum, help)                              \

@@ -23,6 +23,11 @@ struct groom_fit {
     float centre[3];           /* of all points, metres */
     float scale;               /* metres: root mean square distance of all points from the centre */
     float ordinary;            /* size of this scalp over that of an ordinary one: 1 for real hair in metres */
+    struct {                   /* every strand of the capture, where cameras see some only (unseen.h); else 0 */
+        uint32_t n;
+        uint32_t *seen;        /* [groom_fit.n] which those of the target are, rising; room for n */
+        float (*roots)[3], (*root_uv)[2]; /* [n] */
+    } all;
 
     /* --- what the stages have made so far: all of it is in a checkpoint ------------------------ */
     uint32_t stage, phase, iteration; /* where the next step goes on; stage = count: done */

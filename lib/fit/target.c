@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "base/progress.h"
 #include "fit/state.h"
+#include "fit/unseen.h"
 #include "groom/strands.h"
 
 #define STRANDS_PER_PIECE 256
@@ -272,5 +273,7 @@ groom_status target_create(struct groom_fit *fit, const struct groom_strands *st
         report_note(&fit->report, "%u strands started off the scalp and were joined to it.", fit->report.n_joined);
     if (fit->report.n_detached)
         report_note(&fit->report, "%u strands start too far from the head to be joined to it.", fit->report.n_detached);
-    return place_roots(fit, strands, context, diag);
+    if ((st = place_roots(fit, strands, context, diag)) != GROOM_OK)
+        return st;
+    return unseen_remove(fit, context, diag);
 }

@@ -61,6 +61,7 @@ struct groom_fit_options {
     groom_fit_quality quality;
     uint32_t n_cameras;            /* of "visibility"; 0 where it is null */
     struct groom_camera cameras[GROOM_FIT_MAX_CAMERAS];
+    double least_seen;             /* share of a strand's vertices that cameras must see; fewer: it leaves the fit */
 
     struct groom_fit_stages {
         struct {
@@ -181,6 +182,7 @@ struct groom_fit_report {
     groom_scalp_source scalp;
     uint32_t n_joined;      /* strands that started off the scalp and were joined to it */
     uint32_t n_detached;    /* that start too far from it and were left as they are */
+    uint32_t n_unseen;      /* that no camera sees enough of: left out of the stages */
     uint32_t n_reassigned;  /* moved to another operator guide, away from the head */
     uint32_t n_penetrating; /* for which no operator guide keeps them out of the head */
     uint32_t n_losses;

@@ -1,0 +1,22 @@
+/* Strands that no camera sees: taken out of the target, put back into the groom. */
+#ifndef FIT_UNSEEN_H
+#define FIT_UNSEEN_H
+
+#include "fit/state.h"
+
+/* Leaves the target with the strands that are seen: their order stays, n becomes their number, and
+ * fit->all knows the others. All stay where there is no camera, or no camera sees anything.
+ * returns  GROOM_OK, GROOM_ENOMEM, GROOM_ECANCELLED */
+GROOM_MUST_CHECK groom_status unseen_remove(struct groom_fit *fit, const struct groom_context *context,
+                                            struct groom_diag *diag);
+
+/* A groom of all strands: those that are seen as the fit has them, the others instanced by distance, with
+ * the nearest operator guide that keeps them out of the head, and random numbers drawn from the seed.
+ * returns  GROOM_OK, GROOM_ENOMEM */
+GROOM_MUST_CHECK groom_status unseen_restore(const struct groom_fit *fit, const struct groom_context *context,
+                                             struct groom **groom, struct groom_diag *diag);
+
+/* Gives fit->all back. */
+void unseen_finish(struct groom_fit *fit);
+
+#endif
