@@ -113,7 +113,7 @@ static uint32_t buried_with(const struct avoiding *job, const float (*base)[3], 
     return assign_buried(job->head, (const float (*)[3])clumped, m, job->clearance);
 }
 
-/* The nearest that adds nothing to what of the strand is in the head already without it. */
+/* The one it has, else the nearest that adds nothing to what of the strand is in the head already without it. */
 static void avoid_strand(const struct avoiding *job, uint32_t at, float (*scratch)[3], float *blend,
                          struct assign_counts *counts)
 {
@@ -122,16 +122,15 @@ static void avoid_strand(const struct avoiding *job, uint32_t at, float (*scratc
     const uint32_t *candidate = job->candidate + (size_t)at * job->n_candidates;
     float (*base)[3] = scratch, (*clumped)[3] = scratch + m;
 
-    groom->operator_guide_of[i] = candidate[0];
     instance_strand(groom, i, base);
     clump_blend((const float (*)[3])base, m, job->profile, blend);
-    if (buried_with(job, (const float (*)[3])base, blend, candidate[0], clumped) == 0)
+    if (buried_with(job, (const float (*)[3])base, blend, groom->operator_guide_of[i], clumped) == 0)
         return;
     uint32_t own = assign_buried(job->head, (const float (*)[3])base, m, job->clearance);
     for (uint32_t c = 0; c < job->n_candidates; c++)
         if (buried_with(job, (const float (*)[3])base, blend, candidate[c], clumped) <= own) {
+            counts->n_reassigned += groom->operator_guide_of[i] != candidate[c];
             groom->operator_guide_of[i] = candidate[c];
-            counts->n_reassigned += c > 0;
             counts->n_penetrating += own > 0;
             return;
         }

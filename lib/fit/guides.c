@@ -24,6 +24,10 @@ enum phase { SOLVE, ASSIGN, ENDED };
 
 #define TOLERANCE 1e-6
 #define MOST_ITERATIONS 300
+#define USUAL_ACROSS 3.0        /* where strands cannot tell */
+#define HELD 5                  /* one strand of so many is foretold */
+#define TOLERANCE_CHOOSING 1e-3
+#define ITERATIONS_CHOOSING 40
 #define ROUNDS_AT_HEAD 2
 #define HOLD 1.0      /* of a vertex at the head, over the weight of a guide's strands */
 #define ASKED 8       /* strands of a guide that are asked whether they are in the head */
@@ -180,6 +184,82 @@ static uint32_t hold_out_of_head(struct solution *solution, const struct groom_c
 /* The weight of third differences at which waves of `cycles` a guide keep half of their size. */
 static double along_of(double cycles, uint32_t m) { return pow(2 * sin(M_PI * fmin(cycles / (m - 1), 0.5)), -6); }
 
+static groom_status cancelled(struct groom_diag *diag)
+{
+    return groom_fail(diag, GROOM_ECANCELLED, "cancelled while guides were solved for");
+}
+
+/* Every HELD-th strand is left out (held 0) or alone left in (held 1): parts of others weigh nothing. */
+static void weigh_parts(struct mean_strands *mean, const struct mean_part *parts, int held)
+{
+    for (uint32_t i = 0; i < mean->n; i++)
+        for (uint32_t p = 0; p < mean->n_parts; p++) {
+            size_t at = (size_t)i * mean->n_parts + p;
+            int in = (i % HELD == HELD - 1) == held;
+            mean->part[at].shape = in ? parts[at].shape : 0;
+            mean->part[at].clumped = in ? parts[at].clumped : 0;
+        }
+}
+
+/* How well guides, solved for with this pull and without some strands, foretell those; all others add a
+ * constant to it. The shapes are left as they come out. */
+static groom_status foretell(struct solution *solution, const struct mean_part *parts, double along, double across,
+                             double *loss, const struct groom_context *context, struct groom_diag *diag)
+{
+    struct guide_system system = {0};
+    weigh_parts(&solution->mean, parts, 0);
+    groom_status st = guide_system_init(&system, &solution->mean, &solution->laplacian, along, across, context, diag);
+    if (st == GROOM_OK) {
+        guide_system_solve(&system, solution->shape, TOLERANCE_CHOOSING, ITERATIONS_CHOOSING, context);
+        weigh_parts(&solution->mean, parts, 1);
+        *loss = mean_strands_loss(&solution->mean, (const double (*)[3])solution->shape, solution->partial, context);
+    }
+    guide_system_finish(&system);
+    return st;
+}
+
+/* Curl and clump move strands of an operator guide together: those that are left out do not tell whether a
+ * guide follows its strands or their bundle. */
+static int bundles_move(const struct groom *groom)
+{
+    for (uint32_t o = 0; o < groom->n_operators; o++)
+        if (groom->operators[o].enabled && (groom->operators[o].type == GROOM_OPERATOR_CURL ||
+                                            groom->operators[o].type == GROOM_OPERATOR_CLUMP))
+            return 1;
+    return 0;
+}
+
+/* The pull across the scalp that foretells strands best: how much guides have to say of their own depends on
+ * how many strands each has, how far operators scatter them, and how alike guides are. */
+static groom_status choose_across(struct solution *solution, double along, double *across,
+                                  const struct groom_context *context, struct groom_diag *diag)
+{
+    static const double pulls[] = {10, 3, 1, 0.3, 0.1};
+    const struct groom_allocator *allocator = memory_allocator(context);
+    size_t n_parts = (size_t)solution->mean.n * solution->mean.n_parts;
+    double least = INFINITY, loss = INFINITY;
+    groom_status st = GROOM_OK;
+    *across = USUAL_ACROSS;
+    if (bundles_move(solution->fit->groom))
+        return GROOM_OK;
+    struct mean_part *parts = memory_array(allocator, n_parts, sizeof *parts);
+    if (!parts)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to foretell %u strands", solution->mean.n);
+    memcpy(parts, solution->mean.part, n_parts * sizeof *parts);
+    for (int k = 0; st == GROOM_OK && k < 5; k++) {
+        if (progress_cancelled(context))
+            st = cancelled(diag);
+        else if ((st = foretell(solution, parts, along, pulls[k], &loss, context, diag)) == GROOM_OK && loss < least) {
+            least = loss;
+            *across = pulls[k];
+        }
+    }
+    memcpy(solution->mean.part, parts, n_parts * sizeof *parts);
+    memory_release(allocator, parts, n_parts, sizeof *parts);
+    load_shapes(solution);
+    return st;
+}
+
 static groom_status solution_init(struct solution *solution, struct groom_fit *fit, const struct groom_context *context,
                                   struct groom_diag *diag)
 {
@@ -204,6 +284,9 @@ static groom_status solution_init(struct solution *solution, struct groom_fit *f
         (st = guide_laplacian((const float (*)[2])fit->groom->guide_uv, (const float (*)[3])solution->direction,
                               fit->n_guides, fit->options.stages.guides.sigma_d, &solution->laplacian, context,
                               diag)) != GROOM_OK)
+        return st;
+    if (across == GROOM_FIT_AUTO &&
+        (st = choose_across(solution, along_of(cycles, fit->m), &across, context, diag)) != GROOM_OK)
         return st;
     return guide_system_init(&solution->system, &solution->mean, &solution->laplacian, along_of(cycles, fit->m), across,
                              context, diag);
@@ -231,11 +314,6 @@ static double loss_of(const struct solution *solution, const struct groom_contex
     double metres = solution->fit->scale;
     return metres * metres *
            mean_strands_loss(&solution->mean, (const double (*)[3])solution->shape, solution->partial, context);
-}
-
-static groom_status cancelled(struct groom_diag *diag)
-{
-    return groom_fail(diag, GROOM_ECANCELLED, "cancelled while guides were solved for");
 }
 
 static groom_status solve_rounds(struct solution *solution, const struct groom_context *context, struct groom_diag *diag)

@@ -9,6 +9,7 @@
 #include "base/memory.h"
 #include "base/progress.h"
 #include "fit/assign.h"
+#include "fit/bundles.h"
 #include "fit/estimate.h"
 #include "fit/medoids.h"
 #include "fit/smooth.h"
@@ -247,12 +248,23 @@ static groom_status choose_operator_guides(struct groom_fit *fit, const struct g
     return GROOM_OK;
 }
 
+/* Whether strands of an operator guide do something together, by which they can be told. */
+static int moves_bundles(const struct groom_fit_options *options)
+{
+    int together = 0;
+    for (uint32_t i = 0; i < options->n_operators; i++)
+        together |= options->operators[i] == GROOM_OPERATOR_CURL || options->operators[i] == GROOM_OPERATOR_CLUMP;
+    return together;
+}
+
 static groom_status instance(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     float sigma = (float)fit->options.stages.initialize.sigma_instance;
     groom_status st = groom_instance_by_distance(fit->groom, sigma, context, diag);
     if (st == GROOM_OK)
         st = assign_nearest(fit->groom, context, diag);
+    if (st == GROOM_OK && moves_bundles(&fit->options))
+        st = bundles_find(fit, context, diag);
     if (st == GROOM_OK)
         fit->phase = OPERATORS;
     return st;

@@ -9,6 +9,7 @@
 #include "groom/strands.h"
 
 #define NEIGHBOURS 8          /* of which a partner is chosen */
+#define LEAST_PEAK 4          /* of the frequencies, from lowest: 3.6 turns of a strand */
 #define DUPLICATE_SHARE 0.01  /* of the usual squared distance to a neighbour: closer ones are duplicates */
 
 struct matching {
@@ -185,6 +186,16 @@ static groom_status make_base(struct matching *matching, const struct groom_cont
     return st == GROOM_OK ? moments_plan_init(&matching->plan, context, diag) : st;
 }
 
+/* The strongest of the frequencies that windows tell apart. */
+static uint32_t peak_of(const double target[MOMENTS_COUNT])
+{
+    uint32_t best = LEAST_PEAK;
+    for (uint32_t q = LEAST_PEAK; q < MOMENTS_FREQUENCIES; q++)
+        if (target[MOMENTS_SPECTRUM + q] < 0 && target[MOMENTS_SPECTRUM + q] > target[MOMENTS_SPECTRUM + best])
+            best = q;
+    return best;
+}
+
 /* The target's statistics and their covariance. */
 static groom_status measure_target(struct matching *matching, const struct groom_fit *fit, const uint32_t *strand, double floor,
                                    const struct groom_context *context, struct groom_diag *diag)
@@ -195,11 +206,13 @@ static groom_status measure_target(struct matching *matching, const struct groom
             for (int c = 0; c < 3; c++)
                 matching->points[(size_t)i * m + j][c] =
                     fit->target[(size_t)strand[i] * m + j][c] * fit->scale + fit->centre[c];
-    for (int round = 0; round < 2; round++) { /* the second with the levels that the first has found */
+    for (int round = 0; round < 3; round++) { /* each with the levels, then the peak's phase, that were found before */
         moments_measure(&matching->plan, (const float (*)[3])matching->points, matching->values, context);
         moments_mean(matching->values, n_pairs, matching->target);
         memcpy(matching->plan.level, matching->target + MOMENTS_SPECTRUM, sizeof matching->plan.level);
         matching->plan.centroid = matching->target[MOMENTS_CENTROID];
+        matching->plan.peak = round == 0 ? peak_of(matching->target) : matching->plan.peak;
+        matching->plan.phase = round > 0 ? matching->target[MOMENTS_PHASE] : 0;
     }
     return moments_covariance(matching->values, n_pairs, matching->groom->operator_guide_of,
                               matching->groom->n_operator_guides, matching->target, floor, matching->cholesky, context, diag);

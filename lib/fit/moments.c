@@ -17,6 +17,8 @@
 #define LEAST_TURNS 1.5         /* of a strand, at the lowest frequency */
 #define MOST_TURNS 40.0         /* at the highest */
 #define LEAST_LOCAL_TURNS 4.5   /* of a strand, in a third */
+#define FIRST_PHASE_WINDOW 2    /* the second on: curls often set in later than at the root */
+#define LEAST_PHASE_TURNS 3.0   /* of a strand, in the windows of phases */
 #define NYQUIST_SHARE 0.45      /* of a turn a segment */
 #define POWER_FLOOR 1e-8        /* of squared segments: a wobble of 1e-4 rad */
 #define DISTANCE_FLOOR 1e-8     /* of squared lengths */
@@ -85,7 +87,8 @@ groom_status moments_plan_init(struct moments_plan *plan, const struct groom_con
     for (int q = 0; q < N_FREQ; q++)
         plan->frequency[q] = LEAST_TURNS / length * pow(MOST_TURNS / LEAST_TURNS, (double)q / (N_FREQ - 1));
     memset(plan->level, 0, sizeof plan->level);
-    plan->centroid = 0;
+    plan->centroid = plan->phase = 0;
+    plan->peak = N_FREQ / 2;
     memory_release(allocator, values, 2 * (size_t)n, sizeof *values);
     return GROOM_OK;
 }
@@ -210,6 +213,33 @@ static double centroid_of(const struct moments_plan *plan, const struct spectrum
     return all > 0 ? sum / all : 0;
 }
 
+/* By how many turns the wave at the plan's peak is ahead from window to window, towards the tip. */
+static double phase_of(const struct moments_plan *plan, const struct spectrum *s)
+{
+    double re = 0, im = 0;
+    uint32_t q = plan->peak;
+    for (int w = FIRST_PHASE_WINDOW; w < MOMENTS_WINDOWS; w++)
+        for (int c = 0; c < 3; c++) {
+            double x = (double)s->re[w][c][q], y = (double)s->im[w][c][q];
+            double u = (double)s->re[w + 1][c][q], v = (double)s->im[w + 1][c][q];
+            re += x * u + y * v;
+            im += x * v - y * u;
+        }
+    return atan2(im, re) / (2 * PI);
+}
+
+/* Between -1/2 and 1/2 turn. */
+static double turn_between(double a, double b) { return a - b - floor(a - b + 0.5); }
+
+static void measure_phases(const struct moments_plan *plan, const struct spectrum *of_a, const struct spectrum *of_b,
+                           float *out)
+{
+    double a = turn_between(phase_of(plan, of_a), plan->phase), b = turn_between(phase_of(plan, of_b), plan->phase);
+    out[MOMENTS_PHASE] = (float)(plan->phase + 0.5 * (a + b));
+    out[MOMENTS_PHASE + 1] = (float)(0.5 * (fabs(a) + fabs(b)));
+    out[MOMENTS_PHASE + 2] = (float)fabs(turn_between(a, b));
+}
+
 static void measure_spectra(const struct moments_plan *plan, const struct windows *windows, const float (*a)[3],
                             const float (*b)[3], double length, float *out)
 {
@@ -242,6 +272,8 @@ static void measure_spectra(const struct moments_plan *plan, const struct window
                                                      log(power(&of_b, NULL, 1 + w, q, third) + POWER_FLOOR)));
             out[MOMENTS_LOCAL_COHERENCE + at] = (float)log(power(&of_a, &of_b, 1 + w, q, third) + POWER_FLOOR);
         }
+    if (use[plan->peak] && turns[plan->peak] * (m - 1) >= LEAST_PHASE_TURNS)
+        measure_phases(plan, &of_a, &of_b, out);
     double f_a = centroid_of(plan, &of_a, use), f_b = centroid_of(plan, &of_b, use);
     out[MOMENTS_CENTROID] = (float)(0.5 * (f_a + f_b));
     out[MOMENTS_CENTROID + 1] = (float)(0.5 * (fabs(f_a - plan->centroid) + fabs(f_b - plan->centroid)));
@@ -388,7 +420,7 @@ void moments_mean(const float *values, uint32_t n_pairs, double mean[MOMENTS_COU
 
 static int is_deviation(int f)
 {
-    return f == MOMENTS_CENTROID + 1 || f == MOMENTS_CENTROID + 2 || f == MOMENTS_LENGTH + 1 || f == MOMENTS_LENGTH + 3 ||
+    return f == MOMENTS_CENTROID + 1 || f == MOMENTS_CENTROID + 2 || f == MOMENTS_PHASE + 1 || f == MOMENTS_PHASE + 2 || f == MOMENTS_LENGTH + 1 || f == MOMENTS_LENGTH + 3 ||
            (f >= MOMENTS_STRETCH && f < MOMENTS_ASIDE);
 }
 

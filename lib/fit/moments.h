@@ -10,6 +10,8 @@
  *               operator guide cancel, frizz does not, and what scale and bend tell apart stays
  *   spread      mean absolute deviations of the spectra, the strands' mean frequency, and its
  *               difference within pairs: random frequency
+ *   phase       how far the strongest wave runs ahead of its frequency from window to window: the frequency of
+ *               one strand, finer than its spectrum tells, and how it differs between strands
  *   lengths     against the base strand, and their difference within pairs: scale
  *   stretch     how differently the strands of a pair have left their base strands, at six places: along
  *               them (scale) and aside (bend); what is wrong with the guides cancels
@@ -38,7 +40,8 @@ enum moments_index {
     MOMENTS_LOCAL = MOMENTS_COHERENCE + MOMENTS_FREQUENCIES,
     MOMENTS_LOCAL_COHERENCE = MOMENTS_LOCAL + MOMENTS_WINDOWS * MOMENTS_COARSE,
     MOMENTS_CENTROID = MOMENTS_LOCAL_COHERENCE + MOMENTS_WINDOWS * MOMENTS_COARSE,
-    MOMENTS_LENGTH = MOMENTS_CENTROID + 3,
+    MOMENTS_PHASE = MOMENTS_CENTROID + 3,
+    MOMENTS_LENGTH = MOMENTS_PHASE + 3,
     MOMENTS_DISTANCE = MOMENTS_LENGTH + 4,
     MOMENTS_STRETCH = MOMENTS_DISTANCE + MOMENTS_PLACES,
     MOMENTS_ASIDE = MOMENTS_STRETCH + MOMENTS_PLACES,
@@ -56,10 +59,11 @@ struct moments_plan {
     double frequency[MOMENTS_FREQUENCIES]; /* turns per metre, or of whatever unit the points have */
     double apart, off_guide;  /* median squared distances of base strands: of pairs, from operator guides */
     double level[MOMENTS_FREQUENCIES];     /* of the target's spectrum, from which spread is measured */
-    double centroid;                       /* of the target */
+    double centroid, phase;                /* of the target */
+    uint32_t peak;                         /* which frequency is the target's strongest */
 };
 
-/* Fills frequency, apart and off_guide from base and guide; level and centroid are 0.
+/* Fills frequency, apart and off_guide from base and guide; level, centroid and phase are 0, and the peak is where hair usually curls.
  * returns  GROOM_OK, GROOM_ENOMEM */
 GROOM_MUST_CHECK groom_status moments_plan_init(struct moments_plan *plan, const struct groom_context *context,
                                                 struct groom_diag *diag);

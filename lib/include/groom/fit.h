@@ -85,7 +85,7 @@ struct groom_fit_options {
             double learning_rate_curvature, learning_rate_length, learning_rate_angle;
             double lambda, sigma_d, sigma_phi; /* gradient filter: 10, 0.3, 0.4 */
             double cycles;  /* waves along a guide that keep half of their size: 3 */
-            double across;  /* pull of neighbours on the scalp, over that of a guide's strands: 3 */
+            double across;  /* pull of neighbours on the scalp, over that of a guide's strands, or GROOM_FIT_AUTO */
         } guides;
         struct {
             uint32_t pairs;             /* of neighbouring strands, of which statistics are matched */
