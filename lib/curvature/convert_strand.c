@@ -13,6 +13,8 @@
 /* Strands that smooth elements miss by more than this many tolerances are taken with their corners: curvatures
  * there are as large as corners are short. */
 #define CORNERS_BEYOND 2.0
+/* An element that turns so many times as far as the strand's do in the mean goes round once too often. */
+#define LOOP_EXCESS 4.0
 /* Planes of less bending than this (radians) have no torsion worth the name. */
 #define LEAST_BEND 0.03
 
@@ -184,6 +186,28 @@ static void place_vertices(const struct convert_space *space, struct refine_stra
     }
 }
 
+/* Where bending changes sides, the helix through a pair may go once round an axis that it hardly leaves: right
+ * at both ends, a turn too many between. An element that turns by more than half a circle and by far more than
+ * the strand does in the mean is taken as a plain arc. */
+static void take_out_loops(struct convert_space *space, struct refine_strand *strand, uint32_t n)
+{
+    double usual = -1.0;
+    for (uint32_t j = 0; j < n; j++) {
+        vec3 omega = vec_of(strand->q[j]);
+        double turn = sqrt(vec_dot(omega, omega)) * strand->length[j];
+        if (turn <= M_PI)
+            continue;
+        if (usual < 0.0)
+            usual = 2.0 * M_PI * count_turns(&space->spline) / n;
+        vec3 way = vec_sub(space->p[j + 1], space->p[j]);
+        struct helix arc = helix_plain_arc(sqrt(vec_dot(way, way)), space->t[j], space->t[j + 1]);
+        if (turn > LOOP_EXCESS * usual) {
+            vec_store(arc.omega, strand->q[j]);
+            strand->length[j] = arc.length;
+        }
+    }
+}
+
 /* Darboux vectors in the world (in q) to those in the material frame, which is carried along. */
 static void into_frames(const struct trig_rows *trig, struct refine_strand *strand, uint32_t n)
 {
@@ -207,6 +231,7 @@ static void closed_form(struct convert_space *space, struct refine_strand *stran
     spline_at(&space->spline, space->breaks, n + 1, space->p, space->t);
     helix_float_points(n, space->p, space->t, space->work);
     helix_chain(n, (const double (*)[3])space->p, (const double (*)[3])space->t, strand->q, strand->length);
+    take_out_loops(space, strand, n);
     strand->root = root_frame(space->t[0]);
     into_frames(&space->refine.trig, strand, n);
 }

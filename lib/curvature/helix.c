@@ -109,8 +109,7 @@ static void find_axis(const struct pair *k, struct axis *a)
     find_by_bisection(k, a);
 }
 
-/* Turn t0 into t1 the short way, as far as the chord asks. */
-static struct helix plain_arc(double chord, vec3 t0, vec3 t1)
+struct helix helix_plain_arc(double chord, vec3 t0, vec3 t1)
 {
     vec3 axis = vec_cross(t0, t1);
     double sine = sqrt(vec_dot(axis, axis)), angle = atan2(sine, vec_dot(t0, t1));
@@ -123,7 +122,7 @@ struct helix helix_through(vec3 p0, vec3 t0, vec3 p1, vec3 t1)
     vec3 d = vec_sub(p1, p0), n = vec_sub(t0, t1), m = vec_add(t0, t1);
     double chord = sqrt(vec_dot(d, d)), sine = sqrt(vec_dot(n, n)), cosine = sqrt(vec_dot(m, m));
     if (sine < 1e-9 || cosine < 1e-6)
-        return plain_arc(chord, t0, t1);
+        return helix_plain_arc(chord, t0, t1);
     n = vec_scale(1.0 / sine, n);
     m = vec_scale(1.0 / cosine, m);
     vec3 b = vec_cross(n, m);
@@ -136,7 +135,7 @@ struct helix helix_through(vec3 p0, vec3 t0, vec3 p1, vec3 t1)
     /* alpha / sin(alpha), to 4 %: the arc of the plain one over its chord */
     double plain = 1.0 + 0.5708 * k.sin_alpha * k.sin_alpha;
     if (!(length < 2.0 * plain * chord) || !(length > 0.0))
-        return plain_arc(chord, t0, t1);
+        return helix_plain_arc(chord, t0, t1);
     double turn = 2.0 * a.h / length;
     return (struct helix){vec_add(vec_scale(turn * a.c, m), vec_scale(turn * a.s, b)), length};
 }

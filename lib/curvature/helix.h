@@ -23,4 +23,7 @@ struct helix {
 };
 struct helix helix_through(vec3 p0, vec3 t0, vec3 p1, vec3 t1);
 
+/* The arc that turns t0 into t1 the short way, as long as the chord asks. */
+struct helix helix_plain_arc(double chord, vec3 t0, vec3 t1);
+
 #endif

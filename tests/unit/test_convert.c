@@ -254,6 +254,35 @@ START_TEST(an_element_begins_where_handedness_flips)
 }
 END_TEST
 
+/* A coil that goes on about an axis beside the first, with the other hand: where it bends straight over, the helix
+ * through one pair would go round once too often. */
+START_TEST(an_inflection_takes_no_turn_too_many)
+{
+    enum { M = 161, TURNS = 8 };
+    struct groom_conversion_options options = groom_conversion_options_default();
+    struct groom_strands *strands;
+    struct groom_conversion *c;
+    double turns = 0.0;
+    ck_ok(groom_strands_create(1, M, NULL, &strands, NULL));
+    strands->first[1] = M;
+    for (uint32_t k = 0; k < M; k++) {
+        double along = k / (M - 1.0), angle = 2.0 * M_PI * TURNS * along, r = 0.006;
+        strands->points[k][0] = (float)(along > 0.5 ? 2.0 * r - r * cos(angle) : r * cos(angle));
+        strands->points[k][1] = (float)(0.008 * TURNS * along);
+        strands->points[k][2] = (float)(r * sin(angle));
+    }
+    ck_ok(groom_strands_convert(strands, &options, NULL, &c, NULL));
+    for (uint32_t j = 0; j < c->helices->n_elements; j++) {
+        const double *q = c->helices->q[j];
+        turns += sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]) * c->helices->length[j] / (2.0 * M_PI);
+    }
+    ck_assert_double_eq_tol(turns, TURNS, 0.3);
+    ck_assert_float_lt(c->reports[0].error_max_m, 2e-5f);
+    groom_conversion_destroy(c);
+    groom_strands_destroy(strands);
+}
+END_TEST
+
 START_TEST(short_and_repeated_and_pointlike_strands_are_converted)
 {
     for (uint32_t n = 1; n <= 6; n++)
@@ -391,6 +420,6 @@ TEST_SUITE("convert", helices_through_pairs_meet_the_vectors, floating_points_me
            the_root_stays_and_the_root_frame_begins_along_the_strand, a_straight_strand_has_no_curvature,
            a_planar_wave_comes_back_without_loops, a_tiny_strand_comes_back_to_the_digits_it_has,
            a_kink_is_met_at_its_vertices, an_element_begins_where_handedness_flips,
-           short_and_repeated_and_pointlike_strands_are_converted, noise_is_averaged_not_amplified,
+           an_inflection_takes_no_turn_too_many, short_and_repeated_and_pointlike_strands_are_converted, noise_is_averaged_not_amplified,
            a_tolerance_decides_the_count, what_is_not_finite_is_refused_by_name, the_same_bits_for_any_pool,
            each_allocation_may_fail)

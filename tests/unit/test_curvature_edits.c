@@ -216,6 +216,24 @@ END_TEST
 
 /* --- scaling of curls ------------------------------------------------------------------------------ */
 
+/* The vectors turn a strand by 0.7: that much must be turned back. */
+START_TEST(the_gauge_meets_the_vectors)
+{
+    struct cJSON *json = vectors_load("superhelix-primitives.json");
+    if (!json)
+        return;
+    double want = vectors_number(vectors_get(json, "gauge"), "angle_for_0p7");
+    struct groom_superhelices *a = superhelix_coils(5, 30, 5, 1), *b;
+    ck_ok(groom_superhelices_copy(a, NULL, &b, NULL));
+    for (uint32_t i = 0; i < 5; i++) {
+        groom_superhelix_turn_gauge(b, i, 0.7);
+        ck_assert_double_eq_tol(groom_superhelix_gauge(a, i, b, i), want, 1e-12);
+    }
+    groom_superhelices_destroy(a), groom_superhelices_destroy(b);
+    cJSON_Delete(json);
+}
+END_TEST
+
 START_TEST(scaled_curls_meet_the_vectors)
 {
     struct cJSON *json = vectors_load("superhelix-primitives.json");
@@ -369,6 +387,6 @@ TEST_SUITE("curvature_edits", a_turned_gauge_is_the_same_curve_and_is_found, rho
            short_strands_give_only_what_they_have, another_seed_gives_another_head_and_the_same_one_the_same,
            ruffling_refuses_what_is_not_a_chance_or_a_group, the_ends_of_a_blend_are_the_two_grooms,
            between_two_codings_of_one_curve_lies_that_curve, a_blend_follows_partners_and_half_turns,
-           roots_find_their_nearest, scaled_curls_meet_the_vectors, a_held_direction_stays_and_roots_too,
+           roots_find_their_nearest, the_gauge_meets_the_vectors, scaled_curls_meet_the_vectors, a_held_direction_stays_and_roots_too,
            a_ramp_spares_its_zero_end_and_weights_spare_strands, wide_bends_and_straight_hair_stay,
            each_allocation_may_fail, blends_and_scales_have_the_same_bits_for_any_pool)
