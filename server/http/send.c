@@ -105,22 +105,32 @@ static struct MHD_Response *create(struct request *request)
     }
 }
 
-static void add_headers(struct request *request, struct MHD_Response *sent)
+/* returns  false where memory is out; what can be no header is left out */
+static bool add_header(struct MHD_Response *sent, const char *name, const char *value)
+{
+    if (!value[0] || strpbrk(value, "\r\n\t"))
+        return true;
+    return MHD_add_response_header(sent, name, value) == MHD_YES;
+}
+
+/* An answer that lacks one of them would say something else. */
+static bool add_headers(struct request *request, struct MHD_Response *sent)
 {
     const struct response *response = &request->response;
+    bool added = true;
     for (size_t i = 0; i < response->n_headers; i++)
-        MHD_add_response_header(sent, response->headers[i].name, response->headers[i].value);
+        added = added && add_header(sent, response->headers[i].name, response->headers[i].value);
     if (request->route && (request->route->flags & ROUTE_TUS))
-        MHD_add_response_header(sent, "Tus-Resumable", "1.0.0");
+        added = added && add_header(sent, "Tus-Resumable", "1.0.0");
     if (response->content_type)
-        MHD_add_response_header(sent, "Content-Type", response->content_type);
-    if (response->etag[0])
-        MHD_add_response_header(sent, "ETag", response->etag);
-    MHD_add_response_header(sent, "Cache-Control", response->etag[0] ? "no-cache" : "no-store");
-    MHD_add_response_header(sent, "X-Content-Type-Options", "nosniff");
-    MHD_add_response_header(sent, "X-Request-Id", request->id);
+        added = added && add_header(sent, "Content-Type", response->content_type);
+    added = added && add_header(sent, "ETag", response->etag);
+    added = added && add_header(sent, "Cache-Control", response->etag[0] ? "no-cache" : "no-store");
+    added = added && add_header(sent, "X-Content-Type-Options", "nosniff");
+    added = added && add_header(sent, "X-Request-Id", request->id);
     if (request->close)
-        MHD_add_response_header(sent, "Connection", "close");
+        added = added && add_header(sent, "Connection", "close");
+    return added;
 }
 
 int server_send(struct request *request)
@@ -128,7 +138,10 @@ int server_send(struct request *request)
     struct MHD_Response *sent = create(request);
     if (!sent)
         return MHD_NO;
-    add_headers(request, sent);
+    if (!add_headers(request, sent)) {
+        MHD_destroy_response(sent);
+        return MHD_NO; /* the connection breaks */
+    }
     if (request_is_head(request) || request->response.status == 304)
         request->n_sent = 0;
     enum MHD_Result result =
