@@ -30,7 +30,7 @@ static const struct option_spec fit_options[] = {
     {"operators", 0, "LIST", "scale,bend,curl,clump,frizz in the order wanted, or auto"},
     {"quality", 0, "Q", "draft, standard or high"},
     {"seed", 0, "N", "of all random numbers (1)"},
-    {"cameras", 0, "FILE", "cameras of the capture (cameras.json), for visibility"},
+    {"cameras", 0, "FILE", "cameras of the capture, for visibility: cameras.json, transforms.json, or COLMAP's folder of text"},
     {"option", 0, "PATH=VALUE", "any other option: stages.initialize.n_smooth=40 (see: groomctl options)"},
     {"options", 0, "FILE", "options as a JSON object; the ones above come on top"},
     {"wait", 'w', NULL, "follow the job to its end"},

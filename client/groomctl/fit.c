@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -11,6 +12,8 @@
 #include "client/groomctl/output_file.h"
 #include "client/groomctl/read_file.h"
 #include "client/groomctl/transfer.h"
+#include "groom/camera.h"
+#include "groom/fit.h"
 #include "proto/url.h"
 
 /* --- options ---------------------------------------------------------------------------- */
@@ -41,15 +44,56 @@ static cJSON *operator_list(const char *text)
     return list;
 }
 
-/* {"cameras":[...]} as `groomctl sample` writes it becomes the visibility option. */
-static int add_cameras(cJSON *options, const char *path)
+/* COLMAP's two files of a folder, or a JSON file; in the unit and axis of the strands where they are not ours. */
+static groom_status read_cameras(const char *path, struct groom_frame frame, struct groom_camera *cameras, uint32_t *n,
+                                 struct groom_diag *diag)
 {
-    cJSON *json = read_json_file(path);
-    if (!json)
-        return 0;
-    cJSON_DeleteItemFromObjectCaseSensitive(options, "visibility");
-    cJSON_AddItemToObject(options, "visibility", json);
-    return 1;
+    char lenses_path[4096], images_path[4096];
+    struct stat status;
+    size_t n_text = 0, n_images = 0;
+    int is_folder = stat(path, &status) == 0 && S_ISDIR(status.st_mode);
+    snprintf(lenses_path, sizeof lenses_path, is_folder ? "%s/cameras.txt" : "%s", path);
+    snprintf(images_path, sizeof images_path, "%s/images.txt", path);
+    char *text = read_whole_file(lenses_path, &n_text), *images = is_folder ? read_whole_file(images_path, &n_images) : NULL;
+    groom_status st = GROOM_EIO; /* said already */
+    if (text && !is_folder)
+        st = groom_cameras_read_json(text, n_text, frame, cameras, GROOM_FIT_MAX_CAMERAS, n, diag);
+    else if (text && images)
+        st = groom_cameras_read_colmap(text, n_text, images, n_images, frame, cameras, GROOM_FIT_MAX_CAMERAS, n, diag);
+    free(text);
+    free(images);
+    return st;
+}
+
+/* The cameras become the visibility option; what else it holds stays. */
+static int add_cameras(const struct arguments *arguments, cJSON *options, const char *path)
+{
+    const char *unit = argument(arguments, "unit"), *up = argument(arguments, "up");
+    struct groom_frame frame = {.unit_m = 1};
+    struct groom_camera *cameras = calloc(GROOM_FIT_MAX_CAMERAS, sizeof *cameras);
+    struct groom_diag diag = {0};
+    char *text = NULL;
+    uint32_t n = 0;
+    groom_status st = cameras ? GROOM_OK : GROOM_ENOMEM;
+    if (st == GROOM_OK && unit)
+        st = groom_unit_parse(unit, &frame.unit_m, &diag);
+    if (st == GROOM_OK && up)
+        st = groom_up_parse(up, &frame.up, &diag);
+    if (st == GROOM_OK && (st = read_cameras(path, frame, cameras, &n, &diag)) == GROOM_OK)
+        st = groom_cameras_print(cameras, n, &text, &diag);
+    free(cameras);
+    if (st != GROOM_OK && diag.detail[0])
+        fprintf(stderr, "groomctl: %s: %s%s%s\n", path, diag.detail, diag.pointer[0] ? " at " : "", diag.pointer);
+    cJSON *json = text ? cJSON_Parse(text) : NULL, *list = cJSON_DetachItemFromObject(json, "cameras");
+    cJSON *visibility = cJSON_GetObjectItemCaseSensitive(options, "visibility");
+    free(text);
+    cJSON_Delete(json);
+    if (list && !cJSON_IsObject(visibility)) {
+        cJSON_DeleteItemFromObjectCaseSensitive(options, "visibility");
+        visibility = cJSON_AddObjectToObject(options, "visibility");
+    }
+    cJSON_DeleteItemFromObjectCaseSensitive(visibility, "cameras");
+    return list && cJSON_AddItemToObject(visibility, "cameras", list);
 }
 
 static int read_options_file(const struct arguments *arguments, cJSON **options)
@@ -80,7 +124,7 @@ static int build_options(const struct arguments *arguments, cJSON **out)
         cJSON_DeleteItemFromObjectCaseSensitive(options, "operators");
         cJSON_AddItemToObject(options, "operators", operator_list(value));
     }
-    if ((value = argument(arguments, "cameras")) && !add_cameras(options, value))
+    if ((value = argument(arguments, "cameras")) && !add_cameras(arguments, options, value))
         return REFUSED;
     for (size_t i = 0; (value = argument_nth(arguments, "option", i)); i++)
         if (!json_set_path(options, value))

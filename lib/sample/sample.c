@@ -1,11 +1,9 @@
 /* A sample: head, truth, capture, cameras. */
-#include <cjson/cJSON.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "base/memory.h"
-#include "geometry/camera_json.h"
 #include "sample/parts.h"
 
 #define PI 3.14159265358979323846
@@ -104,20 +102,7 @@ static void place_cameras(uint32_t n, struct groom_camera *cameras)
 
 groom_status groom_sample_cameras_print(const struct groom_sample *sample, char **out, struct groom_diag *diag)
 {
-    cJSON *json = cJSON_CreateObject(), *array = cJSON_AddArrayToObject(json, "cameras");
-    int whole = array != NULL;
-    for (uint32_t i = 0; whole && i < sample->n_cameras; i++) {
-        cJSON *camera = camera_to_json(&sample->cameras[i]);
-        whole = cJSON_AddItemToArray(array, camera);
-        if (!whole)
-            cJSON_Delete(camera);
-    }
-    char *text = whole ? cJSON_Print(json) : NULL;
-    cJSON_Delete(json);
-    if (!text)
-        return groom_fail(diag, GROOM_ENOMEM, "no memory for %u cameras as JSON", sample->n_cameras);
-    *out = text;
-    return GROOM_OK;
+    return groom_cameras_print(sample->cameras, sample->n_cameras, out, diag);
 }
 
 /* --- the whole ------------------------------------------------------------------------ */

@@ -10,7 +10,11 @@
 #ifndef GROOM_CAMERA_H
 #define GROOM_CAMERA_H
 
+#include <stddef.h>
 #include <stdint.h>
+
+#include "groom/diag.h"
+#include "groom/io.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -31,6 +35,26 @@ void groom_camera_look_at(const double eye[3], const double target[3], double fo
 
 /* Where p is seen, in pixels, and its depth q.z (metres). Returns 0 for a point behind the camera. */
 int groom_camera_project(const struct groom_camera *camera, const float p[3], double pixel[2], double *depth);
+
+/* Cameras out of files. Each has passed the checks that a camera of a job's options gets.
+ * frame    the unit and up axis of the file, that of the strands reconstructed with it; not for
+ *          {"cameras":[...]}, which is in metres, y up
+ * cameras  [most], the caller's; what is in it on error is unspecified
+ * returns  GROOM_OK, GROOM_EFORMAT, GROOM_EINVAL (a field of ours, with its pointer), GROOM_ETOOBIG (more than `most`) */
+
+/* JSON: {"cameras":[...]} as above, or NeRF's transforms.json: frames with transform_matrix (camera to world,
+ * y up, z backward), w, h, fl_x, fl_y, cx, cy or camera_angle_x, for all frames or each. */
+GROOM_MUST_CHECK groom_status groom_cameras_read_json(const char *json, size_t n_bytes, struct groom_frame frame,
+                                                      struct groom_camera *cameras, uint32_t most, uint32_t *n,
+                                                      struct groom_diag *diag);
+/* COLMAP's text, cameras.txt and images.txt, each ended by a zero byte behind its n. Lens distortion is left out. */
+GROOM_MUST_CHECK groom_status groom_cameras_read_colmap(const char *lenses, size_t n_lenses, const char *images,
+                                                        size_t n_images, struct groom_frame frame,
+                                                        struct groom_camera *cameras, uint32_t most, uint32_t *n,
+                                                        struct groom_diag *diag);
+/* {"cameras":[...]}; malloc'd and ended by 0, for the caller to free(). */
+GROOM_MUST_CHECK groom_status groom_cameras_print(const struct groom_camera *cameras, uint32_t n, char **json,
+                                                  struct groom_diag *diag);
 
 #ifdef __cplusplus
 }
