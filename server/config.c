@@ -33,6 +33,8 @@ static const struct option options[] = {
      "where to listen; port 0 picks a free one; [::1]:8080 for IPv6"},
     {"hosts", "NAMES", TEXT, AT(hosts), "", 0, 0,
      "names that this service has in a proxy, blanks between; localhost and addresses need none"},
+    {"cors-origins", "ORIGINS", TEXT, AT(cors), "", 0, 0,
+     "other sites whose pages may use the API (https://studio.example), blanks between"},
     {"config", "FILE", TEXT, AT(config), "", 0, 0, "read options from FILE, lines of `name = value`"},
     {"workers", "N", COUNT, AT(workers), "1", 1, 256, "jobs that run at a time"},
     {"worker-threads", "N", COUNT, AT(worker_threads), "0", 0, 1024,
@@ -49,6 +51,11 @@ static const struct option options[] = {
     {"slurm-interval", "SECONDS", SECONDS, AT(slurm_interval_s), "2", 1, 600, "between two squeue while jobs run"},
     {"job-time", "SECONDS", SECONDS, AT(job_time_s), "0", 0, 30 * 86400, "processor time of an attempt; 0: no limit"},
     {"job-attempts", "N", COUNT, AT(job_attempts), "3", 1, 100, "attempts of a job that may die before it has failed"},
+    {"max-queue", "N", COUNT, AT(max_queue), "1000", 1, 100000, "jobs that may wait; more are answered 429"},
+    {"token-requests", "N", COUNT, AT(token_requests), "0", 0, 1000000, "requests a second of a token that has no limit of its own; 0: any number"},
+    {"token-bytes", "BYTES", BYTES, AT(token_bytes), "0", 0, (uint64_t)1 << 52, "bytes of a token's uploads, likewise"},
+    {"token-queued", "N", COUNT, AT(token_queued), "0", 0, 100000, "jobs of a token that may wait, likewise"},
+    {"session-time", "SECONDS", SECONDS, AT(session_time_s), "28800", 60, 30 * 86400, "how long a browser's session is good"},
     {"max-upload", "BYTES", BYTES, AT(max_upload), "4G", 1024, ANY, "largest body of an upload"},
     {"upload-expiry", "SECONDS", SECONDS, AT(upload_expiry_s), "259200", 60, 365 * 86400,
      "an upload in pieces that nobody used goes so long after its last byte"},
@@ -66,7 +73,7 @@ static const struct option options[] = {
     {"keep-events", "SECONDS", SECONDS, AT(keep_events_s), "2592000", 0, ANY / 2000,
      "progress events of a job after its end; 0: for ever"},
     {"keep-keys", "SECONDS", SECONDS, AT(keep_keys_s), "604800", 0, ANY / 2000,
-     "idempotency keys, once their job has ended; 0: for ever"},
+     "how long an Idempotency-Key is remembered; 0: for ever"},
     {"keep-jobs", "SECONDS", SECONDS, AT(keep_jobs_s), "0", 0, ANY / 2000,
      "finished jobs; what they made stays; 0: for ever"},
     {"connections", "N", COUNT, AT(connections), "1200", 8, 100000, "open connections"},
@@ -276,6 +283,7 @@ void config_help(FILE *out)
           "Each option is also a line `name = value` of the configuration file and an environment variable\n"
           "(GROOMD_MAX_UPLOAD for --max-upload). The command line wins, then the environment, then the "
           "file.\n\n"
+          "       groomd token create|list|revoke   who may use it; see groomd token --help\n"
           "       groomd check            is all of a data folder whole? see groomd check --help\n"
           "       groomd backup FOLDER    a copy to start from, of a daemon that runs or not\n\n",
           out);

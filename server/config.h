@@ -22,11 +22,13 @@ struct config {
     char launcher[CONFIG_TEXT_SIZE];
     char work_url[CONFIG_TEXT_SIZE], work_folder[CONFIG_TEXT_SIZE], slurm_arguments[CONFIG_TEXT_SIZE];
     char hosts[CONFIG_TEXT_SIZE];  /* names of this service, blanks between */
+    char cors[CONFIG_TEXT_SIZE];   /* origins whose pages may use the API, blanks between */
     char config[CONFIG_TEXT_SIZE]; /* the configuration file */
     char webhook_url[CONFIG_TEXT_SIZE], webhook_secret[CONFIG_TEXT_SIZE];
     char webhook_allow[CONFIG_TEXT_SIZE]; /* addresses and networks, blanks between */
     /* counts, bytes, seconds */
     uint64_t workers, worker_threads, worker_memory, job_time_s, job_attempts;
+    uint64_t token_requests, token_bytes, token_queued, max_queue, session_time_s;
     uint64_t max_upload, upload_expiry_s, max_body, min_free, export_cache;
     uint64_t http_threads, fast_threads, slow_threads, slow_queue;
     uint64_t connections, idle_timeout_s, head_timeout_s, min_rate;

@@ -17,6 +17,9 @@
 
 #include "proto/work.h"
 #include "proto/json_text.h"
+#include "server/access/access.h"
+#include "server/access/command.h"
+#include "server/actor.h"
 #include "server/blobs/blobs.h"
 #include "server/config.h"
 #include "server/grooms/grooms.h"
@@ -40,6 +43,7 @@ struct daemon {
     char worker[PATH_SIZE], temporary[PATH_SIZE], logs[PATH_SIZE], node_logs[PATH_SIZE], threads[48];
     const char *worker_argv[4], *worker_env[2];
     struct listening listening;
+    struct access *access;
     struct blobs *blobs;
     struct store *store;
     struct uploads *uploads;
@@ -92,6 +96,35 @@ static groom_status open_folder(struct daemon *daemon, struct groom_diag *diag)
         (status = make_folder(daemon->temporary, diag)) != GROOM_OK)
         return status;
     return make_folder(daemon->logs, diag);
+}
+
+/* --- tokens ---------------------------------------------------------------------------------- */
+
+/* Tokens are made and revoked by another process, on the file; the audit hears of it here. */
+static void on_token(void *user, const char *action, const struct access_token *token)
+{
+    const struct daemon *daemon = user;
+    const struct actor before = *actor_get(), keeper = {.name = "groomd token"};
+    char members[160];
+    snprintf(members, sizeof members, "\"token\":\"%s\",\"project\":\"%s\"", token->id, token->project);
+    log_members(CONFIG_LOG_INFO, action, members);
+    if (!daemon->store) /* while it starts */
+        return;
+    actor_set(&keeper);
+    if (store_audit_add(daemon->store, token->project, action, token->id, token->name, NULL) != GROOM_OK)
+        log_members(CONFIG_LOG_ERROR, "the audit could not be written", members);
+    actor_set(&before);
+}
+
+static groom_status open_access(struct daemon *daemon, struct groom_diag *diag)
+{
+    const struct config *config = &daemon->config;
+    const struct access_options options = {
+        .folder = config->data,
+        .defaults = {config->token_requests, config->token_bytes, config->token_queued},
+        .changed = on_token,
+        .user = daemon};
+    return access_open(&options, &daemon->access, diag);
 }
 
 /* --- the worker program ------------------------------------------------------------------- */
@@ -230,7 +263,6 @@ static groom_status start_housekeeper(struct daemon *daemon, struct groom_diag *
     return housekeeper_start(&(struct housekeeper_options){.store = daemon->store,
                                                            .jobs = daemon->jobs,
                                                            .keep_events_s = config->keep_events_s,
-                                                           .keep_keys_s = config->keep_keys_s,
                                                            .keep_jobs_s = config->keep_jobs_s},
                              &daemon->housekeeper, diag);
 }
@@ -263,6 +295,7 @@ static groom_status start_control(struct daemon *daemon, struct groom_diag *diag
 static groom_status start_server(struct daemon *daemon, struct groom_diag *diag)
 {
     daemon->service = (struct service){.config = &daemon->config,
+                                       .access = daemon->access,
                                        .store = daemon->store,
                                        .blobs = daemon->blobs,
                                        .uploads = daemon->uploads,
@@ -284,8 +317,10 @@ static groom_status start(struct daemon *daemon, struct groom_diag *diag)
 {
     groom_status status;
     if ((status = find_worker(daemon, diag)) != GROOM_OK ||
-        (status = listen_open(daemon->config.listen, &daemon->listening, diag)) != GROOM_OK ||
-        (status = open_folder(daemon, diag)) != GROOM_OK || (status = open_state(daemon, diag)) != GROOM_OK ||
+        (status = open_folder(daemon, diag)) != GROOM_OK || (status = open_access(daemon, diag)) != GROOM_OK ||
+        (status = listen_open(daemon->config.listen, access_has_usable(daemon->access), &daemon->listening, diag)) !=
+            GROOM_OK ||
+        (status = open_state(daemon, diag)) != GROOM_OK ||
         (status = open_grooms(daemon, diag)) != GROOM_OK ||
         (status = start_supervisor(daemon, diag)) != GROOM_OK ||
         (status = start_housekeeper(daemon, diag)) != GROOM_OK ||
@@ -312,6 +347,7 @@ static void finish(struct daemon *daemon)
     uploads_destroy(daemon->uploads);
     store_close(daemon->store);
     blobs_close(daemon->blobs);
+    access_close(daemon->access);
     if (daemon->listening.fd >= 0)
         close(daemon->listening.fd);
     if (daemon->lock_fd >= 0)
@@ -381,6 +417,8 @@ int main(int argc, char **argv)
     sigset_t signals;
     if (argc > 1 && (!strcmp(argv[1], "check") || !strcmp(argv[1], "backup")))
         return upkeep_command(argc - 1, argv + 1, environ);
+    if (argc > 1 && !strcmp(argv[1], "token"))
+        return access_command(argc - 1, argv + 1, environ);
     groom_status status = config_load(argc, argv, environ, &daemon.config, &action, &diag);
     if (status == GROOM_OK && action == CONFIG_HELP) {
         config_help(stdout);

@@ -25,7 +25,7 @@ static groom_status retire(const struct housekeeper_options *options, struct gro
 {
     int64_t now = store_now_ms();
     const struct store_retention retention = {.events_before_ms = before(now, options->keep_events_s),
-                                              .keys_before_ms = before(now, options->keep_keys_s),
+                                              .keys_before_ms = now,
                                               .jobs_before_ms = before(now, options->keep_jobs_s)};
     struct store_retired retired = {0};
     groom_status status;

@@ -3,7 +3,7 @@
  *
  *   kept for ever     uploads, grooms and revisions, finished jobs with their result, states, stages and losses
  *   --keep-events     the progress and loss events of a finished job's stream
- *   --keep-keys       idempotency keys, once their job has ended
+ *   --keep-keys       idempotency keys, when they expire
  *   --keep-jobs       finished jobs altogether; 0, the default: for ever
  *   --upload-expiry   uploads in pieces that nobody used (server/uploads)
  *   at a job's end    its checkpoint */
@@ -21,7 +21,7 @@ struct store;
 struct housekeeper_options {
     struct store *store; /* borrowed, as are the jobs */
     struct jobs *jobs;
-    uint64_t keep_events_s, keep_keys_s, keep_jobs_s; /* 0: for ever */
+    uint64_t keep_events_s, keep_jobs_s; /* 0: for ever */
     uint32_t round_s;                                 /* 0: 300 */
 };
 

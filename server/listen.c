@@ -66,7 +66,7 @@ static void name_url(struct listening *listening)
              bound.ss_family == AF_INET6 ? "http://[%s]:%s" : "http://%s:%s", host, port);
 }
 
-groom_status listen_open(const char *address, struct listening *listening, struct groom_diag *diag)
+groom_status listen_open(const char *address, bool guarded, struct listening *listening, struct groom_diag *diag)
 {
     char host[256];
     const char *port = NULL;
@@ -77,14 +77,11 @@ groom_status listen_open(const char *address, struct listening *listening, struc
     int wrong = getaddrinfo(host, port, &hints, &found);
     if (wrong)
         return groom_fail(diag, GROOM_EINVAL, "--listen %.100s: %s", address, gai_strerror(wrong));
-    if (!is_loopback(found->ai_addr))
-        status = groom_fail(
-            diag, GROOM_EINVAL,
-            "--listen %.100s is not a loopback address. This version of groomd has no access tokens, so that "
-            "anybody who reaches it could use it; listen on 127.0.0.1 or [::1], and put a proxy that asks "
-            "for "
-            "credentials in front",
-            address);
+    if (!guarded && !is_loopback(found->ai_addr))
+        status = groom_fail(diag, GROOM_EINVAL,
+                            "--listen %.100s is an address that others can reach, and there is no token that is good: "
+                            "make one with `groomd token create --name NAME --data DIR`, or listen on 127.0.0.1",
+                            address);
     else
         status = bind_and_listen(found, address, &listening->fd, diag);
     freeaddrinfo(found);

@@ -34,7 +34,7 @@ static const char *way_out(int status)
 {
     switch (status) {
     case 401:
-        return "give the server's token in GROOM_TOKEN (or --token); `groomd token create` makes one";
+        return "give the server's token in GROOMD_TOKEN (or --token, --token-file); `groomd token create` makes one";
     case 403:
         return "this token may not do that; ask for one with the scope that is missing";
     case 404:

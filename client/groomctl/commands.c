@@ -5,7 +5,8 @@
 
 const struct option_spec groomctl_global_options[] = {
     {"server", 0, "URL", "the daemon (GROOM_SERVER; http://127.0.0.1:8080)"},
-    {"token", 0, "TOKEN", "who is asking, where the server wants to know (GROOM_TOKEN)"},
+    {"token", 0, "TOKEN", "who is asking, where the server wants to know (GROOMD_TOKEN)"},
+    {"token-file", 0, "FILE", "a file with the token in it (~/.config/groom/token)"},
     {"json", 0, NULL, "JSON for scripts, one object a line"},
     {"help", 'h', NULL, "this, or a command's own help"},
     {0},

@@ -4,6 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "client/groomctl/token.h"
 #include "client/groomctl/usage.h"
 
 static volatile sig_atomic_t interrupted;
@@ -35,14 +36,14 @@ static const char *setting(const struct arguments *first, const struct arguments
 }
 
 static int open_client(struct groomctl *ctl, const struct arguments *global,
-                       const struct arguments *arguments)
+                       const struct arguments *arguments, const char *token)
 {
     ctl->json = argument(global, "json") || argument(arguments, "json");
     ctl->is_terminal = isatty(STDERR_FILENO);
     ctl->server = setting(global, arguments, "server", "GROOM_SERVER", "http://127.0.0.1:8080");
     ctl->client = http_client_create(
         &(struct http_client_options){.base_url = ctl->server,
-                                      .token = setting(global, arguments, "token", "GROOM_TOKEN", NULL),
+                                      .token = token[0] ? token : NULL,
                                       .agent = "groomctl",
                                       .interrupted = is_interrupted});
     return ctl->client != NULL;
@@ -52,12 +53,15 @@ static int run(const struct command *command, const struct arguments *global,
                const struct arguments *arguments)
 {
     struct groomctl ctl;
+    char token[TOKEN_SIZE];
     if (arguments->n_operands < command->min_operands)
         return groomctl_usage_error(command->name, "%s is missing", command->operands);
     if (arguments->n_operands > command->max_operands)
         return groomctl_usage_error(command->name, "\"%s\" is too much",
                                     arguments->operands[command->max_operands]);
-    if (!open_client(&ctl, global, arguments))
+    if (!token_find(global, arguments, token))
+        return WRONG_USAGE;
+    if (!open_client(&ctl, global, arguments, token))
         return REFUSED;
     int status = command->run(&ctl, arguments);
     http_client_destroy(ctl.client);

@@ -110,10 +110,11 @@ static groom_status print_page(const char *name, cJSON *items, int64_t next, cha
     return *json ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to list %s", name);
 }
 
-groom_status grooms_list_json(struct grooms *grooms, struct store_page page, char **json, struct groom_diag *diag)
+groom_status grooms_list_json(struct grooms *grooms, const char *project, struct store_page page, char **json,
+                              struct groom_diag *diag)
 {
     struct store_groom_list list = {0};
-    groom_status status = store_grooms_list(grooms->options.store, page, &list, diag);
+    groom_status status = store_grooms_list(grooms->options.store, project, page, &list, diag);
     if (status != GROOM_OK)
         return status;
     cJSON *items = cJSON_CreateArray();
@@ -153,5 +154,14 @@ groom_status grooms_revisions_json(struct grooms *grooms, const char *groom_id, 
     }
     status = print_page("revisions", items, list.next, json, diag);
     store_revision_list_finish(&list);
+    return status;
+}
+
+groom_status project_has(struct grooms *grooms, const char *project, const char *id, struct groom_diag *diag)
+{
+    char found[STORE_PROJECT_SIZE];
+    groom_status status = store_project_of(grooms->options.store, id, found, diag);
+    if (status == GROOM_OK && project && strcmp(found, project) != 0)
+        status = groom_fail(diag, GROOM_ENOTFOUND, "there is no %.40s", id);
     return status;
 }

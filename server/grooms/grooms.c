@@ -160,13 +160,14 @@ void grooms_prepared_finish(struct grooms_prepared *prepared)
     *prepared = (struct grooms_prepared){0};
 }
 
-groom_status grooms_import(struct grooms *grooms, const char *document, size_t n_bytes,
+groom_status grooms_import(struct grooms *grooms, const char *project, const char *document, size_t n_bytes,
                            char groom_id[STORE_ID_SIZE], struct groom_diag *diag)
 {
     struct grooms_prepared prepared;
     groom_status status = grooms_prepare(grooms, document, n_bytes, NULL, &prepared, diag);
     if (status != GROOM_OK)
         return status;
+    prepared.revision.project = project;
     status = store_groom_create(grooms->options.store, &prepared.revision, diag);
     if (status == GROOM_OK)
         memcpy(groom_id, prepared.groom_id, STORE_ID_SIZE);

@@ -56,9 +56,10 @@ GROOM_MUST_CHECK groom_status grooms_prepare(struct grooms *grooms, const char *
                                              struct grooms_prepared *prepared, struct groom_diag *diag);
 void grooms_prepared_finish(struct grooms_prepared *prepared); /* takes zeroed */
 
-/* POST /v1/grooms: prepare and store. The document has passed `groom-worker check-groom`. */
-GROOM_MUST_CHECK groom_status grooms_import(struct grooms *grooms, const char *document, size_t n_bytes,
-                                            char groom_id[STORE_ID_SIZE], struct groom_diag *diag);
+/* POST /v1/grooms: prepare and store. The document has passed `groom-worker check-groom`. What its source
+ * names is looked for in this project alone. */
+GROOM_MUST_CHECK groom_status grooms_import(struct grooms *grooms, const char *project, const char *document,
+                                            size_t n_bytes, char groom_id[STORE_ID_SIZE], struct groom_diag *diag);
 
 /* --- reading ---------------------------------------------------------------------------- */
 
@@ -68,8 +69,8 @@ GROOM_MUST_CHECK groom_status grooms_document(struct grooms *grooms, const char 
                                               bool arrays, char **json, size_t *n_bytes, uint32_t *number,
                                               struct groom_diag *diag);
 /* {"grooms":[{"id","name","revision","created_at","changed_at"},…],"next":…} */
-GROOM_MUST_CHECK groom_status grooms_list_json(struct grooms *grooms, struct store_page page, char **json,
-                                               struct groom_diag *diag);
+GROOM_MUST_CHECK groom_status grooms_list_json(struct grooms *grooms, const char *project, struct store_page page,
+                                               char **json, struct groom_diag *diag);
 /* {"revisions":[{"revision","parent","name","note","created_at"},…],"next":…} */
 GROOM_MUST_CHECK groom_status grooms_revisions_json(struct grooms *grooms, const char *groom_id,
                                                     struct store_page page, char **json,
@@ -103,6 +104,7 @@ GROOM_MUST_CHECK groom_status grooms_revert(struct grooms *grooms, const char *g
 #define GROOMS_EDIT_MOST_NOW 5000
 
 struct grooms_layer_edit {
+    const char *project;    /* of the new groom, and of all that the body names; NULL: any */
     const char *groom_id;     /* what is edited; NULL: */
     const char *strands_id;   /* an upload, of which a new groom is made */
     uint32_t expected;        /* its revision; 0: the latest, whatever it is */
@@ -135,6 +137,7 @@ struct grooms_layer_job {
     const char *kind;    /* "sculpt" */
     const char *inputs;  /* as grooms_layer_edited gave them */
     const char *options;
+    const char *project;          /* the job's: what it names is looked for there */
 };
 /* The layer on its own, with its arrays: for a groom whose base are the strands below. */
 GROOM_MUST_CHECK groom_status grooms_job_layer(struct grooms *grooms, const struct grooms_layer_job *job, char **json,

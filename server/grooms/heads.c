@@ -148,7 +148,7 @@ groom_status heads_acquire(struct grooms *grooms, const char *id, struct head **
     pthread_mutex_lock(&heads->lock);
     *out = find(heads, id);
     pthread_mutex_unlock(&heads->lock);
-    if (*out || store_asset_get(grooms->options.store, STORE_HEAD, id, &asset, NULL) != GROOM_OK)
+    if (*out || store_asset_get(grooms->options.store, NULL, STORE_HEAD, id, &asset, NULL) != GROOM_OK)
         return GROOM_OK; /* a groom from elsewhere: its head is not here */
     struct head *made = calloc(1, sizeof *made);
     groom_status status = made ? load(grooms, &asset, made, diag) : groom_fail(diag, GROOM_ENOMEM, "no memory for a head");

@@ -206,8 +206,9 @@ static groom_status take_input(struct trial *trial)
 
 static groom_status take_head(struct trial *trial)
 {
-    if (!trial->wish.avoid_head || !*trial->subject.head)
-        return GROOM_OK;
+    if (!trial->wish.avoid_head || !*trial->subject.head ||
+        project_has(trial->grooms, trial->edit->project, trial->subject.head, NULL) != GROOM_OK)
+        return GROOM_OK; /* a document may name whatever head it likes */
     return heads_acquire(trial->grooms, trial->subject.head, &trial->head, trial->diag);
 }
 

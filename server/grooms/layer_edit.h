@@ -16,6 +16,7 @@ struct wish {
 
 /* What is edited: a groom's revision, or one that is being made of an upload. */
 struct subject {
+    const char *project; /* what ids may name; NULL: any */
     struct grooms *grooms;
     const struct groom *groom;
     char (*keys)[STORE_HASH_SIZE];

@@ -23,6 +23,7 @@ static groom_status reopen(struct grooms *grooms, const struct grooms_layer_job 
     r->edit.strands_id = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(r->inputs, "strands"));
     revision = cJSON_GetObjectItemCaseSensitive(r->inputs, "revision");
     r->edit.expected = cJSON_IsNumber(revision) ? (uint32_t)revision->valuedouble : 0;
+    r->edit.project = job->project;
     r->edit.body = job->options;
     r->edit.n_body = strlen(job->options);
     r->trial = (struct trial){.grooms = grooms, .edit = &r->edit, .diag = diag, .contact = contact};

@@ -27,7 +27,7 @@ static groom_status check_head(const struct subject *subject, const struct wish 
     struct store_asset asset = {0};
     if (!wish->head)
         return GROOM_OK;
-    groom_status status = store_asset_get(subject->grooms->options.store, STORE_HEAD, wish->head, &asset, diag);
+    groom_status status = store_asset_get(subject->grooms->options.store, subject->project, STORE_HEAD, wish->head, &asset, diag);
     store_asset_finish(&asset);
     if (status == GROOM_ENOTFOUND)
         return groom_fail_field(diag, GROOM_EINVAL, "/head", "there is no upload \"%.40s\"", wish->head);
@@ -58,7 +58,7 @@ static groom_status open_upload(struct subject *subject, const struct grooms_lay
 groom_status subject_open(struct grooms *grooms, const struct grooms_layer_edit *edit, const struct wish *wish,
                           struct subject *subject, struct groom_diag *diag)
 {
-    *subject = (struct subject){.grooms = grooms};
+    *subject = (struct subject){.project = edit->project, .grooms = grooms};
     return edit->groom_id ? open_groom(subject, edit, diag) : open_upload(subject, edit, wish, diag);
 }
 
@@ -130,8 +130,13 @@ groom_status subject_target(const struct subject *subject, const struct wish *wi
         return groom_fail_field(diag, GROOM_EINVAL, "/strands", "give a groom or strands, not both");
     if (!wish->strands && !id)
         return groom_fail_field(diag, GROOM_EINVAL, "/revision", "strands that were uploaded have no revisions");
+    if ((wish->strands || wish->groom) &&
+        (status = project_has(subject->grooms, subject->project, wish->strands ? wish->strands : wish->groom, diag)) !=
+            GROOM_OK)
+        goto missing;
     status = wish->strands ? strands_of_upload(subject->grooms, wish->strands, &strands, diag)
                            : strands_of_groom(subject->grooms, id, &revision, &strands, diag);
+missing:
     if (status == GROOM_ENOTFOUND) {
         const char *pointer = wish->strands ? "/strands" : wish->groom ? "/groom" : "/revision";
         char detail[sizeof diag->detail];
@@ -206,6 +211,7 @@ static groom_status write_new(struct subject *subject, const struct groom *groom
         return status;
     written->next = written->prepared.revision;
     written->next.groom_id = written->prepared.groom_id;
+    written->next.project = edit->project;
     return note_keys(subject, written->next.document, diag);
 }
 

@@ -17,7 +17,7 @@ groom_status grooms_preview(struct grooms *grooms, const char *groom_id, uint32_
     tool_arguments_init(&arguments, grooms, "render");
     tool_add(&arguments, "--view", "%s", groom_view_name(view));
     tool_add(&arguments, "--size", "%u", size);
-    tool_add_head(&arguments, grooms, model->head);
+    tool_add_head(&arguments, grooms, model->groom_id, model->head);
     status = tool_strands_file(grooms, groom_id, model->revision, false, &strands_fd, diag);
     models_release(grooms, model);
     if (status != GROOM_OK)

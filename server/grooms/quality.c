@@ -62,7 +62,7 @@ static groom_status settle(struct grooms *grooms, const char *id, uint32_t revis
     side->is_groom = strncmp(id, "str_", 4) != 0;
     side->revision = side->is_groom ? revision : 0;
     return side->is_groom ? settle_groom(grooms, side, diag)
-                          : store_asset_get(grooms->options.store, STORE_STRANDS, id, &side->asset, diag);
+                          : store_asset_get(grooms->options.store, NULL, STORE_STRANDS, id, &side->asset, diag);
 }
 
 struct pair { struct side subject, target; };
@@ -71,6 +71,15 @@ static void pair_finish(struct pair *pair)
 {
     side_finish(&pair->subject);
     side_finish(&pair->target);
+}
+
+/* Both are there, and not in one project. */
+static bool is_foreign(struct grooms *grooms, const char *id, const char *other)
+{
+    char project[STORE_PROJECT_SIZE], others[STORE_PROJECT_SIZE];
+    struct store *store = grooms->options.store;
+    return store_project_of(store, id, project, NULL) == GROOM_OK &&
+           store_project_of(store, other, others, NULL) == GROOM_OK && strcmp(project, others) != 0;
 }
 
 /* Finish it in any case. */
@@ -86,7 +95,9 @@ static groom_status pair_settle(struct grooms *grooms, const struct grooms_compa
         return groom_fail(diag, GROOM_ENOTFOUND,
                           "%.40s was not fitted to strands of this server: name some to compare it with (?with=str_…)",
                           what->id);
-    status = settle(grooms, with, 0, &pair->target, diag);
+    status = is_foreign(grooms, pair->subject.id, with)
+                 ? groom_fail(diag, GROOM_ENOTFOUND, "there is no %.40s", with)
+                 : settle(grooms, with, 0, &pair->target, diag);
     if (status == GROOM_ENOTFOUND && !what->with)
         return groom_fail(diag, GROOM_ENOTFOUND,
                           "the strands that %.40s was fitted to, %.40s, are not on this server: upload them, or name "
@@ -149,7 +160,7 @@ static groom_status compare(struct grooms *grooms, struct pair *pair, char **rep
     add_frame(&arguments, &pair->subject, own_frame);
     if (drawn.fd >= 0)
         add_file(&arguments, "--drawn", drawn.fd);
-    tool_add_head(&arguments, grooms, pair->subject.head[0] ? pair->subject.head : pair->target.head);
+    tool_add_head(&arguments, grooms, pair->subject.id, pair->subject.head[0] ? pair->subject.head : pair->target.head);
     status = tool_output(&arguments, pair->subject.fd, "the strands could not be compared", report, &n_bytes, diag);
 out:
     side_finish(&drawn);
@@ -255,7 +266,7 @@ groom_status grooms_quality_picture(struct grooms *grooms, const struct grooms_c
         add_file(&arguments, "--framed-as", pair.target.fd);
         add_frame(&arguments, &pair.target, target_frame);
     }
-    tool_add_head(&arguments, grooms, pair.subject.head[0] ? pair.subject.head : pair.target.head);
+    tool_add_head(&arguments, grooms, pair.subject.id, pair.subject.head[0] ? pair.subject.head : pair.target.head);
     status = tool_output(&arguments, drawn->fd, "the picture could not be drawn", png, n_bytes, diag);
 out:
     pair_finish(&pair);

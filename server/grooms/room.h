@@ -162,6 +162,11 @@ groom_status prepare_groom(struct grooms *grooms, const struct groom *groom, con
 groom_status uploads_acquire(struct grooms *grooms, const char *id, struct state **state, char **name,
                              struct groom_diag *diag);
 
+/* --- projects (documents.c) ------------------------------------------------------------------ */
+
+/* GROOM_ENOTFOUND where the id names nothing of this project (NULL: any). */
+groom_status project_has(struct grooms *grooms, const char *project, const char *id, struct groom_diag *diag);
+
 /* --- documents as trees (documents.c) ------------------------------------------------------- */
 
 /* The stored revision (0: the latest) and its document's tree. On GROOM_OK both are the caller's. */

@@ -41,11 +41,13 @@ void tool_add(struct tool_arguments *arguments, const char *name, const char *fo
     arguments->n_text += (size_t)n + 1;
 }
 
-void tool_add_head(struct tool_arguments *arguments, struct grooms *grooms, const char *head_id)
+void tool_add_head(struct tool_arguments *arguments, struct grooms *grooms, const char *of_id, const char *head_id)
 {
-    char path[4096];
+    char path[4096], project[STORE_PROJECT_SIZE];
     struct store_asset head = {0};
-    if (!*head_id || store_asset_get(grooms->options.store, STORE_HEAD, head_id, &head, NULL) != GROOM_OK)
+    struct store *store = grooms->options.store;
+    if (!*head_id || store_project_of(store, of_id, project, NULL) != GROOM_OK ||
+        store_asset_get(store, project, STORE_HEAD, head_id, &head, NULL) != GROOM_OK)
         return;
     if (blobs_path(grooms->options.blobs, head.sha256, path, sizeof path) == GROOM_OK) {
         tool_add(arguments, "--head", "%s", path);

@@ -14,7 +14,7 @@ void tool_arguments_init(struct tool_arguments *arguments, const struct grooms *
 void tool_add(struct tool_arguments *arguments, const char *name, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 /* --head and its frame. A head that is not here (the groom came from elsewhere) is left out. */
-void tool_add_head(struct tool_arguments *arguments, struct grooms *grooms, const char *head_id);
+void tool_add_head(struct tool_arguments *arguments, struct grooms *grooms, const char *of_id, const char *head_id);
 
 /* The strands of a revision as a HAIR file without a name, in metres, read from its start. */
 groom_status tool_strands_file(struct grooms *grooms, const char *groom_id, uint32_t revision, bool drawn, int *fd,

@@ -64,7 +64,7 @@ groom_status uploads_acquire(struct grooms *grooms, const char *id, struct state
 {
     struct store_asset asset = {0};
     struct groom_strands *strands = NULL;
-    groom_status status = store_asset_get(grooms->options.store, STORE_STRANDS, id, &asset, diag);
+    groom_status status = store_asset_get(grooms->options.store, NULL, STORE_STRANDS, id, &asset, diag);
     if (status != GROOM_OK)
         return status;
     if (!(*state = states_find(grooms->states, id)) &&

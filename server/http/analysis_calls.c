@@ -51,7 +51,7 @@ static bool subject_upload(struct request *request, struct subject *subject)
     struct groom_diag diag = {0};
     *subject = (struct subject){0};
     groom_status status =
-        store_asset_get(request->service->store, STORE_STRANDS, request->parameter[0], &subject->asset, &diag);
+        store_asset_get(request->service->store, request->actor.project, STORE_STRANDS, request->parameter[0], &subject->asset, &diag);
     if (status != GROOM_OK)
         respond_failure(request, status, &diag);
     return status == GROOM_OK;

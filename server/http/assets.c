@@ -9,6 +9,7 @@
 #include "proto/json_text.h"
 #include "server/blobs/blobs.h"
 #include "server/http/digest.h"
+#include "server/http/access.h"
 #include "server/http/handlers.h"
 #include "server/http/tool.h"
 #include "server/store/store.h"
@@ -93,6 +94,31 @@ static bool parse_reading(struct request *request, const struct kind *kind, stru
     return tool_query_frame(request, &reading->frame);
 }
 
+static void refuse_quota(struct request *request, const struct groom_diag *diag)
+{
+    request->retry_after_s = 3600; /* until something is removed, or the limit raised */
+    respond_failure(request, GROOM_ELIMIT, diag);
+}
+
+bool assets_check_quota(struct request *request, uint64_t n_bytes)
+{
+    struct store_usage usage;
+    struct groom_diag diag = {0};
+    if (!request->limits.bytes)
+        return true;
+    groom_status status = store_usage_of(request->service->store, request_owner(request), &usage, &diag);
+    if (status == GROOM_OK && usage.n_bytes + n_bytes > request->limits.bytes) {
+        status = groom_fail(&diag, GROOM_ELIMIT,
+                            "the token's uploads have %llu bytes and this one has %llu; its limit is %llu",
+                            (unsigned long long)usage.n_bytes, (unsigned long long)n_bytes,
+                            (unsigned long long)request->limits.bytes);
+        refuse_quota(request, &diag);
+    } else if (status != GROOM_OK) {
+        respond_failure(request, status, &diag);
+    }
+    return status == GROOM_OK;
+}
+
 int assets_check_upload(struct request *request)
 {
     struct reading reading;
@@ -173,9 +199,11 @@ static bool store_upload(struct request *request, const struct kind *kind, const
     cJSON_Delete(found);
     asset->created_ms = store_now_ms();
     groom_status status = asset->format && asset->name
-                              ? store_asset_put(request->service->store, asset, &created, &diag)
+                              ? store_asset_put(request->service->store, asset, request->limits.bytes, &created, &diag)
                               : GROOM_ENOMEM;
-    if (status == GROOM_OK)
+    if (status == GROOM_ELIMIT)
+        refuse_quota(request, &diag);
+    else if (status == GROOM_OK)
         respond_asset(request, kind, created ? 201 : 200, asset);
     else
         respond_failure(request, status, &diag);
@@ -194,8 +222,10 @@ static void take_upload(struct request *request, const struct kind *kind, const 
     char *metadata;
     bool kept = false;
     memcpy(asset.sha256, sha256, sizeof asset.sha256);
-    store_asset_id(kind->store, sha256, reading->format, asset.unit_m, asset.up, asset.id);
-    if (store_asset_get(request->service->store, kind->store, asset.id, &known, NULL) == GROOM_OK) {
+    snprintf(asset.project, sizeof asset.project, "%s", request->actor.project);
+    snprintf(asset.owner, sizeof asset.owner, "%s", request_owner(request));
+    store_asset_id(request->actor.project, kind->store, sha256, reading->format, asset.unit_m, asset.up, asset.id);
+    if (store_asset_get(request->service->store, NULL, kind->store, asset.id, &known, NULL) == GROOM_OK) {
         respond_asset(request, kind, 200, &known);
         store_asset_finish(&known);
         kept = true;
@@ -216,6 +246,8 @@ static void post_upload(struct request *request, const struct kind *kind, const 
     uint64_t n_bytes = 0;
     enum upload_refusal refusal = UPLOAD_NOT_REFUSED;
     struct groom_diag diag = {0};
+    if (!access_check_id(request, request_query(request, "upload")))
+        return;
     groom_status status = uploads_take(request->service->uploads, request_query(request, "upload"), sha256, &n_bytes,
                                        &refusal, &diag);
     if (status == GROOM_OK)
@@ -257,7 +289,7 @@ static bool find(struct request *request, const struct kind *kind, struct store_
 {
     struct groom_diag diag = {0};
     groom_status status =
-        store_asset_get(request->service->store, kind->store, request->parameter[0], asset, &diag);
+        store_asset_get(request->service->store, request->actor.project, kind->store, request->parameter[0], asset, &diag);
     if (status != GROOM_OK)
         respond_failure(request, status, &diag);
     return status == GROOM_OK;
@@ -280,7 +312,7 @@ static void list(struct request *request, const struct kind *kind)
     struct groom_diag diag = {0};
     if (!request_page(request, &page))
         return;
-    groom_status status = store_assets_list(request->service->store, kind->store, page, &found, &diag);
+    groom_status status = store_assets_list(request->service->store, request->actor.project, kind->store, page, &found, &diag);
     if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
         return;

@@ -16,6 +16,7 @@ struct link {
     atomic_llong since_ms;
     atomic_ullong received;
     atomic_bool fresh; /* no request yet: there is no pause between requests to grant */
+    bool gone;         /* the sweep's: its other side was seen to have ended */
 };
 
 struct connections {
@@ -118,6 +119,18 @@ static int is_too_slow(const struct config *config, struct link *link, int64_t n
     }
 }
 
+/* The other side has ended in the middle of a body, and that twice in a row. libmicrohttpd 0.9.75 misses
+ * it where the end came together with the last bytes (it takes a short read for an empty socket, and an
+ * edge of epoll comes once): the request, and the upload that it holds, would wait for the idle timeout. */
+static int has_ended(struct link *link)
+{
+    char byte;
+    bool ended = atomic_load(&link->state) == BODY && recv(link->fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT) == 0;
+    bool again = ended && link->gone;
+    link->gone = ended;
+    return again;
+}
+
 /* Shutting the socket makes libmicrohttpd see its end and close it in its own thread; the lock keeps
  * the descriptor from being another's by then. */
 void connections_sweep(struct connections *connections)
@@ -125,7 +138,7 @@ void connections_sweep(struct connections *connections)
     int64_t now = now_ms();
     pthread_mutex_lock(&connections->lock);
     for (struct link *link = connections->first; link; link = link->next)
-        if (is_too_slow(connections->config, link, now))
+        if (is_too_slow(connections->config, link, now) || has_ended(link))
             shutdown(link->fd, SHUT_RDWR);
     pthread_mutex_unlock(&connections->lock);
 }

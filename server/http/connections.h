@@ -24,7 +24,8 @@ void link_body(struct link *link); /* a body is coming */
 void link_received(struct link *link, uint64_t n_bytes);
 void link_busy(struct link *link); /* the server's turn */
 
-/* Shut what is too slow: no head within the time, or a body below the rate. Call once a second. */
+/* Shut what is too slow: no head within the time, a body below the rate, an end in the middle of a body.
+ * Call a few times a second. */
 void connections_sweep(struct connections *connections);
 
 #endif

@@ -49,15 +49,14 @@ void grooms_call_list(struct request *request)
     struct groom_diag diag = {0};
     if (!request_page(request, &page))
         return;
-    groom_status status = grooms_list_json(request->service->grooms, page, &json, &diag);
+    groom_status status = grooms_list_json(request->service->grooms, request->actor.project, page, &json, &diag);
     if (status != GROOM_OK)
         respond_failure(request, status, &diag);
     else
         respond_bytes(request, 200, "application/json", json, strlen(json));
 }
 
-/* The contract's answer to everything that makes a revision. */
-static void respond_revision(struct request *request, const char *groom_id, uint32_t revision)
+void grooms_respond_revision(struct request *request, const char *groom_id, uint32_t revision)
 {
     cJSON *object = cJSON_CreateObject();
     cJSON_AddStringToObject(object, "groom", groom_id);
@@ -72,7 +71,7 @@ static void respond_edit(struct request *request, groom_status status, uint32_t 
                          const struct groom_diag *diag)
 {
     if (status == GROOM_OK)
-        respond_revision(request, request->parameter[0], revision);
+        grooms_respond_revision(request, request->parameter[0], revision);
     else if (status == GROOM_ECONFLICT)
         respond_refusal(request, 412, "precondition-failed", "it was changed meanwhile", "%s", diag->detail);
     else
@@ -133,10 +132,10 @@ static void import(struct request *request, int checked)
     char *document = map_file(request, checked, n_bytes);
     if (!document)
         return;
-    groom_status status = grooms_import(request->service->grooms, document, n_bytes, id, &diag);
+    groom_status status = grooms_import(request->service->grooms, request->actor.project, document, n_bytes, id, &diag);
     munmap(document, n_bytes);
     if (status == GROOM_OK)
-        respond_revision(request, id, 1);
+        grooms_respond_revision(request, id, 1);
     else
         respond_failure(request, status, &diag);
 }

@@ -3,6 +3,7 @@
 #define HTTP_HANDLERS_H
 
 #include "server/http/request.h"
+#include "server/jobs/jobs.h"
 
 extern const struct route http_routes[];
 extern const size_t http_n_routes;
@@ -22,7 +23,15 @@ void studio_file(struct request *request);
 void page_index(struct request *request);
 void page_style(struct request *request);
 
+/* session_calls.c: who asks, and who asked for what */
+void session_call_get(struct request *request);
+void session_call_post(struct request *request);
+void session_call_delete(struct request *request);
+void audit_call_list(struct request *request);
+
 /* assets.c: uploads */
+/* May the token store so many bytes more? Asks the store. returns  false where it may not (and answered) */
+bool assets_check_quota(struct request *request, uint64_t n_bytes);
 int assets_check_upload(struct request *request);
 void assets_post_strands(struct request *request);
 void assets_list_strands(struct request *request);
@@ -45,6 +54,9 @@ void uploads_call_patch(struct request *request);
 void uploads_call_delete(struct request *request);
 
 /* job_calls.c */
+/* Whose job it is, and how many more may wait; of a queue that is full the answer says when to come again. */
+void jobs_charge(struct request *request, struct jobs_request *submission);
+void jobs_respond(struct request *request, int status, const struct store_job *job);
 void jobs_call_post(struct request *request);
 void jobs_call_list(struct request *request);
 void jobs_call_get(struct request *request);
@@ -71,6 +83,8 @@ void page_quality(struct request *request);
 
 /* groom_calls.c */
 void grooms_call_delete(struct request *request);
+/* The contract's answer to everything that makes a revision. */
+void grooms_respond_revision(struct request *request, const char *groom_id, uint32_t revision);
 void grooms_call_list(struct request *request);
 void grooms_call_import(struct request *request);
 void grooms_call_get(struct request *request);

@@ -13,6 +13,8 @@
 
 /* --- submit ----------------------------------------------------------------------------- */
 
+#define QUEUE_RETRY_S 30 /* when to come again where a queue is full: fits take minutes */
+
 /* A submission, field by field. */
 struct submission {
     char *inputs, *options; /* JSON, malloc'ed */
@@ -56,7 +58,7 @@ static bool take_input(struct request *request, const cJSON *body, cJSON *inputs
         respond_bad_field(request, 400, pointer, "a job needs \"%s\", the id of an upload", key);
         return false;
     }
-    groom_status status = store_asset_get(request->service->store, kind, id, &asset, &diag);
+    groom_status status = store_asset_get(request->service->store, request->actor.project, kind, id, &asset, &diag);
     if (status == GROOM_ENOTFOUND)
         respond_bad_field(request, 422, pointer, "there is no upload \"%.40s\"", id);
     else if (status != GROOM_OK)
@@ -113,6 +115,11 @@ static bool take_priority(struct request *request, const cJSON *body, struct sub
         respond_bad_field(request, 400, "/priority", "priority must be a whole number from -100 to 100");
         return false;
     }
+    if (value > 0 && !(request->scopes & ACCESS_ADMIN)) {
+        respond_bad_field(request, 403, "/priority",
+                          "a priority above 0 goes ahead of other people's jobs: that needs the scope admin");
+        return false;
+    }
     submission->priority = (int32_t)value;
     return true;
 }
@@ -131,42 +138,37 @@ static bool take_body(struct request *request, const cJSON *body, struct submiss
            webhook_take(request, body, &submission->webhook, &submission->n_webhooks);
 }
 
-static void respond_job(struct request *request, int status, const struct store_job *job)
+void jobs_respond(struct request *request, int status, const struct store_job *job)
 {
     respond_json(request, status, jobs_json(job));
     respond_header(request, "Location", "/v1/jobs/%s", job->id);
+}
+
+void jobs_charge(struct request *request, struct jobs_request *submission)
+{
+    submission->project = request->actor.project;
+    submission->owner = request_owner(request);
+    submission->max_queued = (uint32_t)request->service->config->max_queue;
+    submission->max_queued_of_owner = (uint32_t)request->limits.queued;
+    request->retry_after_s = QUEUE_RETRY_S;
 }
 
 static void submit(struct request *request, const struct submission *submission)
 {
     struct store_job job = {0};
     struct groom_diag diag = {0};
-    bool created;
-    const char *key = request_header(request, "Idempotency-Key");
-    if (key && (!key[0] || strlen(key) > 255)) {
-        respond_refusal(request, 400, groom_status_name(GROOM_EINVAL), groom_status_message(GROOM_EINVAL),
-                        "an Idempotency-Key has 1 to 255 characters");
-        return;
-    }
-    const struct jobs_request wanted = {.kind = "fit",
+    struct jobs_request wanted = {.kind = "fit",
                                         .inputs = submission->inputs,
                                         .options = submission->options,
                                         .priority = submission->priority,
-                                        .webhook = submission->n_webhooks ? &submission->webhook : NULL,
-                                        .idempotency_key = key};
-    groom_status status = jobs_submit(request->service->jobs, &wanted, &job, &created, &diag);
-    if (status == GROOM_ECONFLICT) {
-        respond_refusal(request, 422, "idempotency-key-reused", "the key stands for another request",
-                        "this Idempotency-Key came with another body before; take a new key for a new job");
-        return;
-    }
+                                        .webhook = submission->n_webhooks ? &submission->webhook : NULL};
+    jobs_charge(request, &wanted);
+    groom_status status = jobs_submit(request->service->jobs, &wanted, &job, &diag);
     if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
         return;
     }
-    respond_job(request, 202, &job);
-    if (!created)
-        respond_header(request, "Idempotent-Replayed", "true");
+    jobs_respond(request, 202, &job);
     store_job_finish(&job);
 }
 
@@ -196,7 +198,7 @@ void jobs_call_list(struct request *request)
         respond_bad_query(request, "state", "%s", diag.detail);
         return;
     }
-    groom_status status = jobs_list(request->service->jobs, wanted ? &state : NULL, page, &found, &diag);
+    groom_status status = jobs_list(request->service->jobs, request->actor.project, wanted ? &state : NULL, page, &found, &diag);
     if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
         return;
@@ -230,7 +232,7 @@ static bool answer(struct request *request, bool only_end)
     }
     bool over = store_job_state_is_end(job.state);
     if (over || !only_end)
-        respond_job(request, 200, &job);
+        jobs_respond(request, 200, &job);
     store_job_finish(&job);
     return over || !only_end;
 }
@@ -284,7 +286,7 @@ void jobs_call_delete(struct request *request)
         return;
     }
     /* 202: its worker still stops */
-    respond_job(request, store_job_state_is_end(job.state) ? 200 : 202, &job);
+    jobs_respond(request, store_job_state_is_end(job.state) ? 200 : 202, &job);
     store_job_finish(&job);
 }
 

@@ -39,10 +39,10 @@ static void submit(struct request *request, const struct grooms_layer_edit *want
 {
     struct store_job job = {0};
     struct groom_diag diag = {0};
-    bool created;
-    const struct jobs_request submission = {.kind = groom_operator_name(wanted->type), .inputs = edited->inputs,
-                                            .options = edited->json};
-    groom_status status = jobs_submit(request->service->jobs, &submission, &job, &created, &diag);
+    struct jobs_request submission = {.kind = groom_operator_name(wanted->type), .inputs = edited->inputs,
+                                      .options = edited->json};
+    jobs_charge(request, &submission);
+    groom_status status = jobs_submit(request->service->jobs, &submission, &job, &diag);
     if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
         return;
@@ -76,7 +76,7 @@ static void respond_empty_body(struct request *request)
 
 static void call(struct request *request, groom_operator_type type)
 {
-    struct grooms_layer_edit wanted = {.type = type, .n_body = (size_t)request->n_received};
+    struct grooms_layer_edit wanted = {.project = request->actor.project, .type = type, .n_body = (size_t)request->n_received};
     if (strstr(request->route->pattern, "/v1/strands"))
         wanted.strands_id = request->parameter[0];
     else

@@ -34,11 +34,11 @@ static void put_groom(FILE *out, const struct store_groom *groom)
                  "</figcaption></figure>\n", groom->id, groom->id);
 }
 
-static void put_grooms(FILE *out, struct store *store)
+static void put_grooms(FILE *out, struct store *store, const char *project)
 {
     struct store_groom_list grooms = {0};
     fputs("<h2>Grooms</h2>\n<div class=\"grooms\">\n", out);
-    if (store_grooms_list(store, (struct store_page){.limit = N_SHOWN}, &grooms, NULL) != GROOM_OK)
+    if (store_grooms_list(store, project, (struct store_page){.limit = N_SHOWN}, &grooms, NULL) != GROOM_OK)
         fputs("<p>The database does not answer.</p>\n", out);
     else if (grooms.n == 0)
         fputs("<p>None yet.</p>\n", out);
@@ -73,13 +73,13 @@ static void put_job(FILE *out, const struct store_job *job)
     fputs("</td></tr>\n", out);
 }
 
-static void put_jobs(FILE *out, struct jobs *jobs)
+static void put_jobs(FILE *out, struct jobs *jobs, const char *project)
 {
     struct store_job_list list = {0};
     fputs("<h2>Jobs</h2>\n<table><tr><th>job</th><th>state</th><th>stage</th><th>progress</th><th>created</"
           "th><th>result</th></tr>\n",
           out);
-    if (jobs_list(jobs, NULL, (struct store_page){.limit = N_SHOWN}, &list, NULL) != GROOM_OK)
+    if (jobs_list(jobs, project, NULL, (struct store_page){.limit = N_SHOWN}, &list, NULL) != GROOM_OK)
         fputs("<tr><td colspan=\"6\">The database does not answer.</td></tr>\n", out);
     for (size_t i = 0; i < list.n; i++)
         put_job(out, &list.items[i]);
@@ -104,8 +104,14 @@ void page_index(struct request *request)
           "<a href=\"/openapi.json\">API</a> <a href=\"/v1/options\">options</a> <a "
           "href=\"/metrics\">metrics</a></p>\n",
           out);
-    put_grooms(out, request->service->store);
-    put_jobs(out, request->service->jobs);
+    if (request->scopes & ACCESS_READ) {
+        put_grooms(out, request->service->store, request->actor.project);
+        put_jobs(out, request->service->jobs, request->actor.project);
+    } else {
+        fputs("<p>This service asks for a token, which its keeper makes with <code>groomd token create</code>. A "
+              "browser trades it for a session with <code>POST /v1/session</code>.</p>\n",
+              out);
+    }
     fputs("</body></html>\n", out);
     html_respond(request, out, &text, &size);
 }

@@ -237,7 +237,7 @@ void respond_problem(struct request *request, const struct problem *problem)
     else
         respond_static(request, 507, PROBLEM_MEDIA_TYPE, no_memory, sizeof no_memory - 1);
     if (full.status == 429 || full.status == 503)
-        respond_header(request, "Retry-After", "%d", 2);
+        respond_header(request, "Retry-After", "%u", request->retry_after_s ? request->retry_after_s : 2);
 }
 
 void respond_failure(struct request *request, groom_status status, const struct groom_diag *diag)

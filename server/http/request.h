@@ -14,6 +14,8 @@
 
 #include "groom/diag.h"
 #include "proto/problem.h"
+#include "server/access/access.h"
+#include "server/actor.h"
 #include "server/blobs/blobs.h"
 #include "server/http/lane.h"
 #include "server/http/router.h"
@@ -28,7 +30,7 @@ struct upload_writer;
 
 enum response_kind { RESPONSE_NONE, RESPONSE_BYTES, RESPONSE_FILE, RESPONSE_EVENTS };
 
-#define RESPONSE_MAX_HEADERS 6
+#define RESPONSE_MAX_HEADERS 8
 struct response {
     enum response_kind kind;
     int status;
@@ -43,7 +45,7 @@ struct response {
     size_t n_headers;
     struct {
         const char *name;
-        char value[320];
+        char value[360];
     } headers[RESPONSE_MAX_HEADERS];
 };
 
@@ -70,7 +72,10 @@ struct request {
     unsigned char digest[32];
     struct evp_md_ctx_st *hash;
 
-    struct store_attempt_ref attempt; /* ROUTE_WORK: who is asking */
+    struct actor actor; /* who is asking, and for which project */
+    unsigned scopes;    /* of enum access_scope */
+    struct access_limits limits;
+    struct store_attempt_ref attempt; /* ROUTE_WORK: the attempt that is asking */
     struct response response;
 
     /* the server's */
@@ -85,7 +90,16 @@ struct request {
     size_t body_capacity;
     int64_t started_us;
     uint64_t n_sent;
+    bool owned; /* the id in the path is of this project */
+    char key_hash[STORE_HASH_SIZE];
+    uint32_t retry_after_s; /* of a 429 or 503; 0: 2 */
 };
+
+/* For limits and fair turns: the token, or the project where none is asked for. */
+static inline const char *request_owner(const struct request *request)
+{
+    return request->actor.token[0] ? request->actor.token : request->actor.project;
+}
 
 /* --- reading ---------------------------------------------------------------------- */
 

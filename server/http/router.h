@@ -39,11 +39,16 @@ struct route {
     int (*check)(struct request *request);
 };
 
+/* Every other call asks for a token of the scope read (GET) or submit; an {id} in its path must be of the
+ * token's project. */
 #define ROUTE_WORK    1 /* asks for the bearer token of an attempt */
 #define ROUTE_QUIET   2 /* logged at level debug: probes and progress */
 #define ROUTE_RESUMES 4 /* its handler calls request_resume when it has the answer */
 #define ROUTE_WAITS   8 /* its check runs in the fast lane and may wait for the database */
 #define ROUTE_TUS     16 /* of the tus protocol: every answer carries Tus-Resumable */
+#define ROUTE_PUBLIC  32 /* asks for nothing; who comes with a token is known by it */
+#define ROUTE_ADMIN   64 /* asks for the scope admin */
+#define ROUTE_LOOKS   128 /* asks for read, though it is no GET */
 
 enum router_outcome { ROUTER_FOUND, ROUTER_NO_PATH, ROUTER_NO_METHOD };
 

@@ -3,15 +3,19 @@
 
 /* clang-format off */
 const struct route http_routes[] = {
-    {"GET", "/", studio_index, BODY_NONE, LANE_INLINE, "", 0, NULL},
-    {"GET", "/studio/{file}", studio_file, BODY_NONE, LANE_INLINE, "", 0, NULL},
-    {"GET", "/status", page_index, BODY_NONE, LANE_FAST, "", 0, NULL},
-    {"GET", "/status.css", page_style, BODY_NONE, LANE_INLINE, "", 0, NULL},
+    {"GET", "/", studio_index, BODY_NONE, LANE_INLINE, "", ROUTE_PUBLIC, NULL},
+    {"GET", "/studio/{file}", studio_file, BODY_NONE, LANE_INLINE, "", ROUTE_PUBLIC, NULL},
+    {"GET", "/status", page_index, BODY_NONE, LANE_FAST, "", ROUTE_PUBLIC, NULL},
+    {"GET", "/status.css", page_style, BODY_NONE, LANE_INLINE, "", ROUTE_PUBLIC, NULL},
     {"GET", "/grooms/{id}/quality", page_quality, BODY_NONE, LANE_SLOW, "revision with", 0, NULL},
-    {"GET", "/healthz", about_health, BODY_NONE, LANE_INLINE, "", ROUTE_QUIET, NULL},
-    {"GET", "/readyz", about_ready, BODY_NONE, LANE_FAST, "", ROUTE_QUIET, NULL},
-    {"GET", "/metrics", about_metrics, BODY_NONE, LANE_FAST, "", ROUTE_QUIET, NULL},
-    {"GET", "/openapi.json", about_openapi, BODY_NONE, LANE_INLINE, "", 0, NULL},
+    {"GET", "/healthz", about_health, BODY_NONE, LANE_INLINE, "", ROUTE_QUIET | ROUTE_PUBLIC, NULL},
+    {"GET", "/readyz", about_ready, BODY_NONE, LANE_FAST, "", ROUTE_QUIET | ROUTE_PUBLIC, NULL},
+    {"GET", "/metrics", about_metrics, BODY_NONE, LANE_FAST, "", ROUTE_QUIET | ROUTE_ADMIN, NULL},
+    {"GET", "/openapi.json", about_openapi, BODY_NONE, LANE_INLINE, "", ROUTE_PUBLIC, NULL},
+    {"GET", "/v1/session", session_call_get, BODY_NONE, LANE_FAST, "", 0, NULL},
+    {"POST", "/v1/session", session_call_post, BODY_NONE, LANE_FAST, "", ROUTE_LOOKS, NULL},
+    {"DELETE", "/v1/session", session_call_delete, BODY_NONE, LANE_INLINE, "", ROUTE_PUBLIC, NULL},
+    {"GET", "/v1/audit", audit_call_list, BODY_NONE, LANE_FAST, "limit before", ROUTE_ADMIN, NULL},
     {"GET", "/v1/options", about_options, BODY_NONE, LANE_FAST, "", 0, NULL},
 
     {"POST", "/v1/strands", assets_post_strands, BODY_BLOB, LANE_SLOW, "format unit up name upload", 0, assets_check_upload},
@@ -28,7 +32,7 @@ const struct route http_routes[] = {
     {"DELETE", "/v1/heads/{id}", assets_delete_head, BODY_NONE, LANE_FAST, "", 0, NULL},
     {"GET", "/v1/heads/{id}/data", assets_get_head_data, BODY_NONE, LANE_FAST, "", 0, NULL},
 
-    {"OPTIONS", "/v1/uploads", uploads_call_options, BODY_NONE, LANE_INLINE, "", ROUTE_TUS, NULL},
+    {"OPTIONS", "/v1/uploads", uploads_call_options, BODY_NONE, LANE_INLINE, "", ROUTE_TUS | ROUTE_PUBLIC, NULL},
     {"POST", "/v1/uploads", uploads_call_post, BODY_UPLOAD, LANE_FAST, "", ROUTE_TUS | ROUTE_WAITS, uploads_check_post},
     {"GET", "/v1/uploads/{id}", uploads_call_get, BODY_NONE, LANE_FAST, "", ROUTE_TUS, NULL},
     {"PATCH", "/v1/uploads/{id}", uploads_call_patch, BODY_UPLOAD, LANE_SLOW, "", ROUTE_TUS | ROUTE_WAITS, uploads_check_patch},

@@ -7,6 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "server/http/access.h"
 #include "server/http/events.h"
 #include "server/http/server.h"
 
@@ -128,6 +129,7 @@ static bool add_headers(struct request *request, struct MHD_Response *sent)
     added = added && add_header(sent, "Cache-Control", response->etag[0] ? "no-cache" : "no-store");
     added = added && add_header(sent, "X-Content-Type-Options", "nosniff");
     added = added && add_header(sent, "X-Request-Id", request->id);
+    access_add_cors(request, sent);
     if (request->close)
         added = added && add_header(sent, "Connection", "close");
     return added;

@@ -1,3 +1,4 @@
+#include "server/http/access.h"
 #include "server/http/digest.h"
 #include "server/http/events.h"
 #include "server/http/server.h"
@@ -174,8 +175,8 @@ static bool is_own_name(const struct config *config, const char *authority)
            router_knows(config->hosts, name);
 }
 
-/* Groomd asks for no token, so that a page of another site must not be able to command it through the
- * browser of somebody on this machine. */
+/* A page of another site must not be able to command groomd through the browser of somebody who may: on
+ * loopback nobody is asked for a token. */
 static bool check_origin(struct request *request)
 {
     const struct config *config = request->service->config;
@@ -189,10 +190,11 @@ static bool check_origin(struct request *request)
         return true;
     const char *authority = strstr(origin, "://");
     authority = authority ? authority + 3 : "";
-    if ((host && !strcasecmp(authority, host)) || router_knows(config->hosts, authority))
+    if ((host && !strcasecmp(authority, host)) || router_knows(config->hosts, authority) ||
+        access_allows_origin(request, origin))
         return true;
     respond_refusal(request, 403, "cross-origin", "pages of other sites may not do this",
-                    "Origin is %.100s, which is not this service", origin);
+                    "Origin is %.100s, which is not this service; --cors-origins says which others may", origin);
     return false;
 }
 
@@ -422,11 +424,26 @@ void request_resume(struct request *request)
 static void run_handler(struct task *task)
 {
     struct request *request = (struct request *)task;
-    bool resumes = request->route->flags & ROUTE_RESUMES;
+    const struct route *route = request->route;
+    bool goes_on = (!access_needs_owner(request) || access_check_owner(request)) && access_begin_once(request);
+    actor_set(&request->actor);
     json_memory_begin();
-    request->route->handle(request); /* where it resumes, the request may be gone by now */
-    if (!resumes)
-        request_resume(request);
+    if (goes_on)
+        route->handle(request); /* where it resumes, the request may be gone by now */
+    actor_set(NULL);
+    if (goes_on && route->flags & ROUTE_RESUMES)
+        return;
+    if (goes_on)
+        access_end_once(request);
+    request_resume(request);
+}
+
+static void become_attempt(struct request *request)
+{
+    struct actor *actor = &request->actor;
+    snprintf(actor->token, sizeof actor->token, "%.40s.%u", request->attempt.job_id, request->attempt.number);
+    snprintf(actor->name, sizeof actor->name, "attempt");
+    request->scopes = ACCESS_WORK;
 }
 
 /* The bearer token of an attempt, against the store. */
@@ -436,13 +453,12 @@ static void check_attempt(struct request *request)
     const char *header = request_header(request, "Authorization");
     const char *token = header && !strncasecmp(header, "Bearer ", 7) ? header + 7 : "";
     groom_status status = work_authenticate(request->service->jobs, token, &request->attempt, &diag);
-    if (status == GROOM_ENOTFOUND) {
-        respond_refusal(request, 401, "unauthorized", "the request needs a valid token",
-                        "this call takes the bearer token of an attempt");
-        respond_header(request, "WWW-Authenticate", "Bearer realm=\"groomd work\"");
-    } else if (status != GROOM_OK) {
+    if (status == GROOM_ENOTFOUND)
+        access_refuse(request, token[0] ? "invalid_token" : NULL, "this call takes the bearer token of an attempt");
+    else if (status != GROOM_OK)
         respond_failure(request, status, &diag);
-    }
+    else
+        become_attempt(request);
 }
 
 static bool is_answered(const struct request *request) { return request->response.kind != RESPONSE_NONE; }
@@ -454,6 +470,8 @@ static void run_check(struct task *task)
     int flags = request->route->flags;
     if (flags & ROUTE_WORK)
         check_attempt(request);
+    else if (access_needs_owner(request))
+        access_check_owner(request);
     if (!is_answered(request) && (flags & ROUTE_WAITS) && !request->route->check(request) && !is_answered(request))
         respond_failure(request, GROOM_EINTERNAL, NULL);
     request_resume(request);
@@ -518,7 +536,7 @@ static enum MHD_Result refuse(struct request *request)
 static bool check_head(struct request *request)
 {
     return !is_answered(request) && read_length(request) && check_origin(request) && find_route(request) &&
-           check_query(request) && check_media(request) && check_size(request) &&
+           access_check(request) && check_query(request) && check_media(request) && check_size(request) &&
            digest_start(request) &&
            (!request->route->check || (request->route->flags & ROUTE_WAITS) || request->route->check(request));
 }
@@ -543,7 +561,7 @@ static enum MHD_Result on_head(struct request *request)
     if (!check_head(request))
         return refuse(request);
     request->phase = PHASE_CHECKED;
-    if (request->route->flags & (ROUTE_WORK | ROUTE_WAITS)) {
+    if (request->route->flags & (ROUTE_WORK | ROUTE_WAITS) || (request->n_expected && access_needs_owner(request))) {
         if (start(request, request->server->fast, run_check, true))
             return MHD_YES;
         return refuse(request);
@@ -613,6 +631,7 @@ static void *on_target(void *user, const char *target, struct MHD_Connection *co
     unsigned long long number = atomic_fetch_add(&server->next_id, 1);
     snprintf(request->id, sizeof request->id, "%08llx%06llx",
              (unsigned long long)server->id_base & 0xffffffff, number & 0xffffffffff);
+    snprintf(request->actor.request, sizeof request->actor.request, "%s", request->id);
     snprintf(request->path, sizeof request->path, "%s", target);
     request->path[strcspn(request->path, "?")] = 0;
     atomic_fetch_add(&server->n_requests, 1);
@@ -647,7 +666,7 @@ static void remote_of(struct request *request, char *text, size_t capacity)
 
 static void write_access_log(struct request *request, double seconds, enum MHD_RequestTerminationCode code)
 {
-    char members[900], path[400], remote[64];
+    char members[1100], path[400], remote[64];
     int status = request->response.status;
     bool quiet = request->route && (request->route->flags & ROUTE_QUIET);
     enum config_log_level level = status >= 500 ? CONFIG_LOG_WARNING
@@ -658,9 +677,10 @@ static void write_access_log(struct request *request, double seconds, enum MHD_R
     remote_of(request, remote, sizeof remote);
     snprintf(members, sizeof members,
              "\"request\":\"%s\",\"method\":\"%s\",\"path\":\"%s\",\"status\":%d,\"seconds\":%.6f,"
-             "\"received\":%llu,\"sent\":%llu,\"remote\":\"%s\"%s",
+             "\"received\":%llu,\"sent\":%llu,\"remote\":\"%s\",\"token\":\"%s\",\"project\":\"%s\"%s",
              request->id, request->method, log_escape(request->path, path, sizeof path), status, seconds,
              (unsigned long long)request->n_received, (unsigned long long)request->n_sent, remote,
+             request->actor.token, request->actor.project,
              code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? "" : ",\"broken\":true");
     log_members(level, "request", members);
 }
@@ -714,10 +734,9 @@ static void *tick(void *user)
 {
     struct server *server = user;
     struct timespec pause = {0, 200000000};
-    for (unsigned round = 0; !atomic_load(&server->ending); round++) {
+    while (!atomic_load(&server->ending)) {
         followers_tick(server->followers);
-        if (round % 5 == 0)
-            connections_sweep(server->connections);
+        connections_sweep(server->connections);
         nanosleep(&pause, NULL);
     }
     return NULL;

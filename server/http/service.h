@@ -4,6 +4,7 @@
 
 #include "server/config.h"
 
+struct access;
 struct blobs;
 struct grooms;
 struct jobs;
@@ -13,6 +14,7 @@ struct uploads;
 
 struct service {
     const struct config *config;
+    struct access *access;
     struct store *store;
     struct blobs *blobs;
     struct uploads *uploads;

@@ -245,7 +245,7 @@ static bool check_room(struct request *request, uint64_t n_bytes)
         respond_failure(request, GROOM_ENOSPC, NULL);
         return false;
     }
-    return true;
+    return assets_check_quota(request, n_bytes);
 }
 
 /* With a body (creation-with-upload) its first piece follows at once. */
@@ -275,7 +275,8 @@ int uploads_check_post(struct request *request)
         (metadata && !check_metadata(request, metadata)) || (request->n_expected > 0 && !check_type(request)) ||
         !check_room(request, n_bytes))
         return 0;
-    groom_status status = uploads_begin(request->service->uploads, n_bytes, metadata, &upload, &diag);
+    groom_status status = uploads_begin(request->service->uploads, request->actor.project, request_owner(request),
+                                       n_bytes, metadata, &upload, &diag);
     if (status != GROOM_OK) {
         respond_failure(request, status, &diag);
         return 0;

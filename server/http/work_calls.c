@@ -147,7 +147,7 @@ static bool take_edit(struct request *request, struct store_job *job, struct gro
         respond_failure(request, status, &diag);
         return false;
     }
-    *edit = (struct grooms_layer_job){job->kind, job->request, job->options};
+    *edit = (struct grooms_layer_job){job->kind, job->request, job->options, job->project};
     return true;
 }
 
@@ -216,7 +216,7 @@ static groom_status take_any(struct request *request, const char *bytes, size_t 
     groom_status status = jobs_get(request->service->jobs, request->attempt.job_id, &job, diag);
     if (status != GROOM_OK)
         return status;
-    const struct grooms_layer_job edit = {job.kind, job.request, job.options};
+    const struct grooms_layer_job edit = {job.kind, job.request, job.options, job.project};
     status = strcmp(job.kind, "fit")
                  ? grooms_job_result(request->service->grooms, &edit, bytes, n_bytes, store_edited, request, diag)
                  : take_result(request, bytes, n_bytes, diag);

@@ -154,22 +154,6 @@ groom_status jobs_move(struct jobs *jobs, const struct store_job_move *move, str
 
 /* --- what HTTP calls ------------------------------------------------------------------------ */
 
-/* What an idempotency key stands for. */
-static groom_status hash_request(const struct jobs_request *request, char hash[STORE_HASH_SIZE])
-{
-    size_t n_kind = strlen(request->kind) + 1, n_inputs = strlen(request->inputs) + 1;
-    size_t n_options = strlen(request->options) + 1;
-    char *all = malloc(n_kind + n_inputs + n_options);
-    if (!all)
-        return GROOM_ENOMEM;
-    memcpy(all, request->kind, n_kind);
-    memcpy(all + n_kind, request->inputs, n_inputs);
-    memcpy(all + n_kind + n_inputs, request->options, n_options);
-    work_hash(all, n_kind + n_inputs + n_options, hash);
-    free(all);
-    return GROOM_OK;
-}
-
 void jobs_set_webhook(struct jobs *jobs, const struct store_webhook_new *webhook) { jobs->webhook = *webhook; }
 
 /* The job's own and everybody's. returns  how many */
@@ -185,21 +169,22 @@ static size_t list_webhooks(const struct jobs *jobs, const struct jobs_request *
 }
 
 groom_status jobs_submit(struct jobs *jobs, const struct jobs_request *request, struct store_job *job,
-                         bool *created, struct groom_diag *diag)
+                         struct groom_diag *diag)
 {
-    char id[STORE_ID_SIZE], hash[STORE_HASH_SIZE];
+    char id[STORE_ID_SIZE];
     struct store_webhook_new webhooks[2];
     struct store_job_new row = {.webhooks = webhooks, .n_webhooks = list_webhooks(jobs, request, webhooks), .id = id, .kind = request->kind, .request = request->inputs,
                                 .options = request->options, .priority = request->priority,
-                                .idempotency_key = request->idempotency_key, .request_hash = hash};
-    char present[STORE_ID_SIZE];
-    groom_status status;
-    if ((status = store_make_id("job_", id)) != GROOM_OK || (status = hash_request(request, hash)) != GROOM_OK)
+                                .project = request->project, .owner = request->owner,
+                                .max_queued = request->max_queued,
+                                .max_queued_of_owner = request->max_queued_of_owner};
+    groom_status status = store_make_id("job_", id);
+    if (status != GROOM_OK)
         return groom_fail(diag, status, "a job could not be made");
-    if ((status = store_job_create(jobs->store, &row, present, created, diag)) != GROOM_OK)
+    if ((status = store_job_create(jobs->store, &row, diag)) != GROOM_OK)
         return status;
     jobs_nudge(jobs);
-    return store_job_get(jobs->store, present, job, diag);
+    return store_job_get(jobs->store, id, job, diag);
 }
 
 groom_status jobs_get(struct jobs *jobs, const char *id, struct store_job *job, struct groom_diag *diag)
@@ -207,10 +192,10 @@ groom_status jobs_get(struct jobs *jobs, const char *id, struct store_job *job, 
     return store_job_get(jobs->store, id, job, diag);
 }
 
-groom_status jobs_list(struct jobs *jobs, const enum store_job_state *state, struct store_page page,
-                       struct store_job_list *list, struct groom_diag *diag)
+groom_status jobs_list(struct jobs *jobs, const char *project, const enum store_job_state *state,
+                       struct store_page page, struct store_job_list *list, struct groom_diag *diag)
 {
-    return store_jobs_list(jobs->store, state, page, list, diag);
+    return store_jobs_list(jobs->store, project, state, page, list, diag);
 }
 
 /* A queued job may be taken between the look and the move: then it is a running one's turn. */

@@ -28,21 +28,23 @@ struct jobs_request {
     const char *options;         /* JSON object, complete */
     int32_t priority;
     const struct store_webhook_new *webhook; /* who is told of its end, or NULL */
-    const char *idempotency_key; /* or NULL */
+    const char *project, *owner;  /* NULL: the default; see store.h */
+    uint32_t max_queued, max_queued_of_owner; /* 0: no limit */
 };
 
-/* Queue a job; *created false: the idempotency key named one that is there already.
+/* Queue a job.
  * job      as it is now; the caller's, store_job_finish
- * returns  GROOM_ECONFLICT: the key stands for another request (HTTP 422) */
+ * returns  GROOM_ELIMIT (a queue is full), GROOM_ECONFLICT (another request with the same
+ *          Idempotency-Key came first) */
 GROOM_MUST_CHECK groom_status jobs_submit(struct jobs *jobs, const struct jobs_request *request,
-                                          struct store_job *job, bool *created, struct groom_diag *diag);
+                                          struct store_job *job, struct groom_diag *diag);
 /* Who is told of every job's end besides; the texts are borrowed and outlive the jobs. Before any is submitted. */
 void jobs_set_webhook(struct jobs *jobs, const struct store_webhook_new *webhook);
 /* returns  GROOM_ENOTFOUND */
 GROOM_MUST_CHECK groom_status jobs_get(struct jobs *jobs, const char *id, struct store_job *job,
                                        struct groom_diag *diag);
-GROOM_MUST_CHECK groom_status jobs_list(struct jobs *jobs, const enum store_job_state *state,
-                                        struct store_page page, struct store_job_list *list,
+GROOM_MUST_CHECK groom_status jobs_list(struct jobs *jobs, const char *project,
+                                        const enum store_job_state *state, struct store_page page, struct store_job_list *list,
                                         struct groom_diag *diag);
 /* A queued job is cancelled when this returns; a running one once its worker has stopped (within
  * about 2 s: watch it); a job in an end state stays what it is.

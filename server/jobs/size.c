@@ -35,7 +35,7 @@ static uint64_t count_vertices(struct jobs *jobs, const cJSON *request)
     struct store_asset asset = {0};
     const char *id = cJSON_GetStringValue(member(request, "strands"));
     double n = 0;
-    if (!id || store_asset_get(jobs->store, STORE_STRANDS, id, &asset, NULL) != GROOM_OK)
+    if (!id || store_asset_get(jobs->store, NULL, STORE_STRANDS, id, &asset, NULL) != GROOM_OK)
         return 0;
     cJSON *metadata = cJSON_Parse(asset.metadata);
     const cJSON *vertices = member(metadata, "vertices");

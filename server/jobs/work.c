@@ -76,7 +76,7 @@ static groom_status read_input(struct jobs *jobs, const cJSON *request, size_t i
 {
     const cJSON *id = cJSON_GetObjectItemCaseSensitive(request, inputs[i].name);
     *found = cJSON_IsString(id);
-    return *found ? store_asset_get(jobs->store, inputs[i].kind, id->valuestring, asset, diag) : GROOM_OK;
+    return *found ? store_asset_get(jobs->store, NULL, inputs[i].kind, id->valuestring, asset, diag) : GROOM_OK;
 }
 
 /* Where the workers see the blob, if they do. */

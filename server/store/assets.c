@@ -7,15 +7,18 @@
 
 #include "server/store/database.h"
 
-#define COLUMNS "seq, id, kind, sha256, n_bytes, format, unit_m, up, name, metadata, created"
+#define COLUMNS "seq, id, kind, sha256, n_bytes, format, unit_m, up, name, metadata, created, project, owner"
 
-void store_asset_id(enum store_asset_kind kind, const char *sha256, const char *format, double unit_m, char up,
-                    char id[STORE_ID_SIZE])
+/* The default project's ids are those of the time before there were projects. */
+void store_asset_id(const char *project, enum store_asset_kind kind, const char *sha256, const char *format,
+                    double unit_m, char up, char id[STORE_ID_SIZE])
 {
-    char key[256];
+    char key[320];
     unsigned char hash[EVP_MAX_MD_SIZE] = {0};
     int n = snprintf(key, sizeof key, "%d|%.64s|%.32s|%.17g|%c", (int)kind, sha256, format ? format : "",
                      unit_m, up);
+    if (strcmp(project_or_default(project), STORE_DEFAULT_PROJECT) != 0)
+        n += snprintf(key + n, sizeof key - (size_t)n, "|%.64s", project);
     EVP_Digest(key, (size_t)n, hash, NULL, EVP_sha256(), NULL);
     n = snprintf(id, STORE_ID_SIZE, "%s", kind == STORE_STRANDS ? "str_" : "head_");
     for (int i = 0; i < 20; i++)
@@ -38,21 +41,34 @@ static int64_t read_asset(struct query *q, struct store_asset *asset)
     asset->name = query_string(q, 8);
     asset->metadata = query_string(q, 9);
     asset->created_ms = query_int64(q, 10);
+    query_copy(q, 11, asset->project, sizeof asset->project);
+    query_copy(q, 12, asset->owner, sizeof asset->owner);
     return query_int64(q, 0);
 }
 
-groom_status store_asset_put(struct store *store, const struct store_asset *asset, bool *created,
-                             struct groom_diag *diag)
+/* With this upload, which is inserted already. */
+static groom_status check_room(struct connection *c, const char *owner, uint64_t n_bytes, uint64_t max_bytes,
+                               struct groom_diag *diag)
+{
+    struct store_usage usage = {0};
+    groom_status status = max_bytes ? usage_read(c, owner, &usage, diag) : GROOM_OK;
+    if (status == GROOM_OK && usage.n_bytes > max_bytes && max_bytes)
+        status = groom_fail(diag, GROOM_ELIMIT,
+                            "the token's uploads have %llu bytes and this one has %llu; its limit is %llu",
+                            (unsigned long long)(usage.n_bytes - n_bytes), (unsigned long long)n_bytes,
+                            (unsigned long long)max_bytes);
+    return status;
+}
+
+static groom_status insert_asset(struct connection *c, const struct store_asset *asset, const char *owner,
+                                 int64_t now, bool *created, struct groom_diag *diag)
 {
     char up[2] = {asset->up, 0};
     int64_t n_changed = 0;
-    struct connection *c;
-    groom_status status = transaction_begin(store, &c, diag);
-    if (status != GROOM_OK)
-        return status;
     struct query q = query_open(c,
                                 "INSERT INTO assets (id, kind, sha256, n_bytes, format, unit_m, up, name,"
-                                " metadata, created) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)"
+                                " metadata, created, project, owner)"
+                                " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)"
                                 " ON CONFLICT (id) DO NOTHING", diag);
     query_text(&q, 1, asset->id);
     query_integer(&q, 2, asset->kind);
@@ -63,22 +79,47 @@ groom_status store_asset_put(struct store *store, const struct store_asset *asse
     query_text(&q, 7, up);
     query_text(&q, 8, asset->name ? asset->name : "");
     query_text(&q, 9, asset->metadata ? asset->metadata : "{}");
-    query_integer(&q, 10, asset->created_ms ? asset->created_ms : store_now_ms());
-    status = transaction_end(c, query_run(&q, &n_changed), diag);
-    if (status == GROOM_OK && created)
-        *created = n_changed == 1;
+    query_integer(&q, 10, asset->created_ms ? asset->created_ms : now);
+    query_text(&q, 11, project_or_default(asset->project));
+    query_text(&q, 12, owner);
+    groom_status status = query_run(&q, &n_changed);
+    *created = n_changed == 1;
     return status;
 }
 
-groom_status store_asset_get(struct store *store, enum store_asset_kind kind, const char *id,
-                             struct store_asset *asset, struct groom_diag *diag)
+groom_status store_asset_put(struct store *store, const struct store_asset *asset, uint64_t max_bytes, bool *created,
+                             struct groom_diag *diag)
+{
+    const char *project = project_or_default(asset->project), *owner = asset->owner[0] ? asset->owner : project;
+    const char *action = asset->kind == STORE_STRANDS ? "strands.upload" : "head.upload";
+    bool inserted = false;
+    int64_t now = store_now_ms();
+    struct connection *c;
+    groom_status status = transaction_begin(store, &c, diag);
+    if (status != GROOM_OK)
+        return status;
+    status = insert_asset(c, asset, owner, now, &inserted, diag);
+    if (status == GROOM_OK && inserted)
+        status = check_room(c, owner, asset->n_bytes, max_bytes, diag);
+    if (status == GROOM_OK && inserted)
+        status = audit_append(c, project, action, asset->id, asset->name, now, diag);
+    status = transaction_end(c, status, diag);
+    if (status == GROOM_OK && created)
+        *created = inserted;
+    return status;
+}
+
+groom_status store_asset_get(struct store *store, const char *project, enum store_asset_kind kind,
+                             const char *id, struct store_asset *asset, struct groom_diag *diag)
 {
     struct store_asset row = {0};
     bool found = false;
     struct connection *c = read_begin(store);
-    struct query q = query_open(c, "SELECT " COLUMNS " FROM assets WHERE id = ?1 AND kind = ?2", diag);
+    struct query q = query_open(c, "SELECT " COLUMNS " FROM assets WHERE id = ?1 AND kind = ?2"
+                                   " AND (?3 IS NULL OR project = ?3)", diag);
     query_text(&q, 1, id);
     query_integer(&q, 2, kind);
+    query_text(&q, 3, project);
     if ((found = query_row(&q)))
         read_asset(&q, &row);
     groom_status status = query_end(&q);
@@ -93,17 +134,18 @@ groom_status store_asset_get(struct store *store, enum store_asset_kind kind, co
     return status;
 }
 
-groom_status store_assets_list(struct store *store, enum store_asset_kind kind, struct store_page page,
-                               struct store_asset_list *list, struct groom_diag *diag)
+groom_status store_assets_list(struct store *store, const char *project, enum store_asset_kind kind,
+                               struct store_page page, struct store_asset_list *list, struct groom_diag *diag)
 {
     struct store_asset_list found = {0};
     int64_t last = 0;
     struct connection *c = read_begin(store);
-    struct query q = query_open(c, "SELECT " COLUMNS " FROM assets WHERE kind = ?1 AND seq < ?2"
+    struct query q = query_open(c, "SELECT " COLUMNS " FROM assets WHERE kind = ?1 AND seq < ?2 AND project = ?4"
                                        " ORDER BY seq DESC LIMIT ?3", diag);
     query_integer(&q, 1, kind);
     query_integer(&q, 2, page_before(page));
     query_integer(&q, 3, page_limit(page));
+    query_text(&q, 4, project_or_default(project));
     while (query_row(&q)) {
         if ((int64_t)found.n == page_limit(page) - 1) {
             found.next = last;

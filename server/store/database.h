@@ -122,8 +122,8 @@ void database_close_copy(struct store *store);
 
 groom_status groom_add_revision(struct connection *c, const struct store_revision_new *revision,
                                 uint32_t expected_latest, struct groom_diag *diag);
-groom_status groom_insert(struct connection *c, const struct store_revision_new *revision, int64_t now,
-                          struct groom_diag *diag);
+groom_status groom_insert(struct connection *c, const struct store_revision_new *revision, const char *project,
+                          int64_t now, struct groom_diag *diag);
 groom_status quality_insert(struct connection *c, const struct store_quality *key, const char *report, int64_t now,
                             struct groom_diag *diag);
 groom_status event_append(struct connection *c, const char *job_id, const char *type, const char *data,
@@ -131,6 +131,27 @@ groom_status event_append(struct connection *c, const char *job_id, const char *
 groom_status webhook_insert(struct connection *c, const char *job_id, const struct store_webhook_new *webhook,
                             int64_t now, struct groom_diag *diag);
 groom_status webhooks_release(struct connection *c, const char *job_id, int64_t now, struct groom_diag *diag);
+groom_status audit_append(struct connection *c, const char *project, const char *action, const char *subject,
+                          const char *detail, int64_t now, struct groom_diag *diag);
+/* The Idempotency-Key of the present request, where it has one, stands for this from now on.
+ * returns  GROOM_ECONFLICT where another came first */
+groom_status key_insert(struct connection *c, const char *project, const char *subject, uint32_t number, int64_t now,
+                        struct groom_diag *diag);
+groom_status usage_read(struct connection *c, const char *owner, struct store_usage *usage,
+                        struct groom_diag *diag);
+/* "" and NULL are the default project. */
+const char *project_or_default(const char *project);
+
+/* The queue in its order, as rows (seq, position): priorities first; then owners in turn, those first of
+ * whose jobs fewer run, and among these the one whose turn is longest ago; an owner's own by age.
+ * `which` narrows it down ("AND not_before <= ?1"). */
+#define QUEUE_IN_ORDER(which)                                                                      \
+    "(WITH running AS (SELECT owner, count(*) AS n FROM jobs WHERE state = 1 GROUP BY owner),"     \
+    " waiting AS (SELECT jobs.seq, priority, coalesce(turns.taken, 0) AS taken, coalesce(running.n, 0) +" \
+    "  row_number() OVER (PARTITION BY jobs.owner, priority ORDER BY jobs.seq) AS turn"            \
+    "  FROM jobs LEFT JOIN running USING (owner) LEFT JOIN turns USING (owner) WHERE state = 0 " which ")" \
+    " SELECT seq, row_number() OVER (ORDER BY priority DESC, turn, taken, seq) - 1 AS position FROM waiting)"
+
 /* The limit of a page, one more than asked for, so that a next page shows itself. */
 int64_t page_limit(struct store_page page);
 int64_t page_before(struct store_page page);

@@ -1,4 +1,5 @@
 /* Grooms and their revisions. A revision's large arrays are stored once by their hash. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -60,15 +61,27 @@ static groom_status insert_revision(struct connection *c, const struct store_rev
     return status;
 }
 
-groom_status groom_insert(struct connection *c, const struct store_revision_new *revision, int64_t now,
-                          struct groom_diag *diag)
+/* Who changed it, and what a repeated request is to be told. */
+static groom_status note_change(struct connection *c, const struct store_revision_new *revision,
+                                const char *project, const char *action, uint32_t number, int64_t now,
+                                struct groom_diag *diag)
+{
+    char detail[96];
+    snprintf(detail, sizeof detail, "revision %u: %.60s", number, revision->note ? revision->note : "");
+    groom_status status = key_insert(c, project, revision->groom_id, number, now, diag);
+    return status == GROOM_OK ? audit_append(c, project, action, revision->groom_id, detail, now, diag) : status;
+}
+
+groom_status groom_insert(struct connection *c, const struct store_revision_new *revision, const char *project,
+                          int64_t now, struct groom_diag *diag)
 {
     int64_t n_changed = 0;
-    struct query q = query_open(c, "INSERT INTO grooms (id, name, latest, created, changed)"
-                                       " VALUES (?1, ?2, 1, ?3, ?3) ON CONFLICT (id) DO NOTHING", diag);
+    struct query q = query_open(c, "INSERT INTO grooms (id, name, latest, created, changed, project)"
+                                   " VALUES (?1, ?2, 1, ?3, ?3, ?4) ON CONFLICT (id) DO NOTHING", diag);
     query_text(&q, 1, revision->groom_id);
     query_text(&q, 2, revision->name ? revision->name : "");
     query_integer(&q, 3, now);
+    query_text(&q, 4, project);
     groom_status status = query_run(&q, &n_changed);
     if (status == GROOM_OK && n_changed == 0)
         status = groom_fail(diag, GROOM_ECONFLICT, "there is a groom %.40s already", revision->groom_id);
@@ -78,7 +91,7 @@ groom_status groom_insert(struct connection *c, const struct store_revision_new 
         struct store_quality key = {revision->groom_id, 1, revision->compared_with};
         status = quality_insert(c, &key, revision->quality, now, diag);
     }
-    return status;
+    return status == GROOM_OK ? note_change(c, revision, project, "groom.create", 1, now, diag) : status;
 }
 
 groom_status store_groom_create(struct store *store, const struct store_revision_new *revision,
@@ -88,17 +101,21 @@ groom_status store_groom_create(struct store *store, const struct store_revision
     groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    return transaction_end(c, groom_insert(c, revision, store_now_ms(), diag), diag);
+    return transaction_end(c, groom_insert(c, revision, project_or_default(revision->project), store_now_ms(), diag),
+                           diag);
 }
 
+/* project: NULL, or filled in */
 static groom_status read_latest(struct connection *c, const char *groom_id, uint32_t *latest,
-                                struct groom_diag *diag)
+                                char project[STORE_PROJECT_SIZE], struct groom_diag *diag)
 {
-    struct query q = query_open(c, "SELECT latest FROM grooms WHERE id = ?1", diag);
+    struct query q = query_open(c, "SELECT latest, project FROM grooms WHERE id = ?1", diag);
     query_text(&q, 1, groom_id);
     bool found = query_row(&q);
     if (found)
         *latest = (uint32_t)query_int64(&q, 0);
+    if (found && project)
+        query_copy(&q, 1, project, STORE_PROJECT_SIZE);
     groom_status status = query_end(&q);
     if (status == GROOM_OK && !found)
         status = groom_fail(diag, GROOM_ENOTFOUND, "there is no groom %.40s", groom_id);
@@ -121,8 +138,9 @@ groom_status groom_add_revision(struct connection *c, const struct store_revisio
                                 uint32_t expected_latest, struct groom_diag *diag)
 {
     uint32_t latest = 0;
+    char project[STORE_PROJECT_SIZE] = "";
     int64_t now = store_now_ms();
-    groom_status status = read_latest(c, revision->groom_id, &latest, diag);
+    groom_status status = read_latest(c, revision->groom_id, &latest, project, diag);
     if (status != GROOM_OK)
         return status;
     if (latest != expected_latest)
@@ -130,7 +148,9 @@ groom_status groom_add_revision(struct connection *c, const struct store_revisio
                           "the groom is at revision %u by now, not %u: get it and edit that", latest,
                           expected_latest);
     status = advance_groom(c, revision, latest + 1, now, diag);
-    return status == GROOM_OK ? insert_revision(c, revision, latest + 1, now, diag) : status;
+    if (status == GROOM_OK)
+        status = insert_revision(c, revision, latest + 1, now, diag);
+    return status == GROOM_OK ? note_change(c, revision, project, "groom.revise", latest + 1, now, diag) : status;
 }
 
 groom_status store_revision_add(struct store *store, const struct store_revision_new *revision,
@@ -164,7 +184,7 @@ groom_status store_revision_get(struct store *store, const char *groom_id, uint3
     uint32_t latest = 0;
     bool found = false;
     struct connection *c = read_begin(store);
-    groom_status status = read_latest(c, groom_id, &latest, diag);
+    groom_status status = read_latest(c, groom_id, &latest, NULL, diag);
     if (status == GROOM_OK) {
         struct query q = query_open(c,
                                     "SELECT groom_id, number, parent, ?3, name, note, created, document"
@@ -223,7 +243,7 @@ groom_status store_revisions_list(struct store *store, const char *groom_id, str
     struct store_revision_list found = {0};
     uint32_t latest = 0;
     struct connection *c = read_begin(store);
-    groom_status status = read_latest(c, groom_id, &latest, diag);
+    groom_status status = read_latest(c, groom_id, &latest, NULL, diag);
     if (status == GROOM_OK) {
         struct query q = query_open(c,
                                     "SELECT groom_id, number, parent, ?4, name, note, created, NULL"
@@ -252,16 +272,17 @@ groom_status store_revisions_list(struct store *store, const char *groom_id, str
     return status;
 }
 
-groom_status store_grooms_list(struct store *store, struct store_page page, struct store_groom_list *list,
-                               struct groom_diag *diag)
+groom_status store_grooms_list(struct store *store, const char *project, struct store_page page,
+                               struct store_groom_list *list, struct groom_diag *diag)
 {
     struct store_groom_list found = {0};
     int64_t last = 0;
     struct connection *c = read_begin(store);
     struct query q = query_open(c, "SELECT seq, id, name, latest, created, changed FROM grooms"
-                                       " WHERE seq < ?1 ORDER BY seq DESC LIMIT ?2", diag);
+                                       " WHERE seq < ?1 AND project = ?3 ORDER BY seq DESC LIMIT ?2", diag);
     query_integer(&q, 1, page_before(page));
     query_integer(&q, 2, page_limit(page));
+    query_text(&q, 3, project_or_default(project));
     while (query_row(&q)) {
         if ((int64_t)found.n == page_limit(page) - 1) {
             found.next = last;

@@ -17,20 +17,34 @@ static bool allowed(enum store_job_state from, enum store_job_state to)
 
 /* --- taking --------------------------------------------------------------------------- */
 
+/* The others' turn comes first now. */
+static groom_status note_turn(struct connection *c, const char *owner, struct groom_diag *diag)
+{
+    struct query q = query_open(c, "INSERT INTO turns (owner, taken)"
+                                   " SELECT ?1, coalesce(max(taken), 0) + 1 FROM turns WHERE true"
+                                   " ON CONFLICT (owner) DO UPDATE SET taken = excluded.taken", diag);
+    query_text(&q, 1, owner);
+    return query_run(&q, NULL);
+}
+
 static groom_status take_first(struct connection *c, int64_t now, struct store_attempt_ref *ref,
                                struct groom_diag *diag)
 {
     struct query q = query_open(c,
                                 "UPDATE jobs SET state = 1, attempt = attempt + 1,"
                                 " started = CASE started WHEN 0 THEN ?1 ELSE started END"
-                                " WHERE seq = (SELECT seq FROM jobs WHERE state = 0 AND not_before <= ?1"
-                                "  ORDER BY priority DESC, seq LIMIT 1) RETURNING id, attempt", diag);
+                                " WHERE seq = (SELECT seq FROM " QUEUE_IN_ORDER("AND not_before <= ?1")
+                                "  WHERE position = 0) RETURNING id, attempt, owner", diag);
+    char owner[STORE_OWNER_SIZE];
     query_integer(&q, 1, now);
-    if (query_row(&q)) {
+    bool found = query_row(&q);
+    if (found) {
         query_copy(&q, 0, ref->job_id, sizeof ref->job_id);
         ref->number = (uint32_t)query_int64(&q, 1);
+        query_copy(&q, 2, owner, sizeof owner);
     }
-    return query_end(&q);
+    groom_status status = query_end(&q);
+    return status == GROOM_OK && found ? note_turn(c, owner, diag) : status;
 }
 
 static groom_status insert_attempt(struct connection *c, const struct store_attempt_ref *ref,
@@ -85,18 +99,20 @@ struct present {
     enum store_job_state state;
     uint32_t attempt;
     bool cancel_requested;
+    char project[STORE_PROJECT_SIZE];
 };
 
 static groom_status read_present(struct connection *c, const char *job_id, struct present *present,
                                  struct groom_diag *diag)
 {
-    struct query q = query_open(c, "SELECT state, attempt, cancel_requested FROM jobs WHERE id = ?1", diag);
+    struct query q = query_open(c, "SELECT state, attempt, cancel_requested, project FROM jobs WHERE id = ?1", diag);
     query_text(&q, 1, job_id);
     bool found = query_row(&q);
     if (found) {
         present->state = (enum store_job_state)query_int64(&q, 0);
         present->attempt = (uint32_t)query_int64(&q, 1);
         present->cancel_requested = query_int64(&q, 2) != 0;
+        query_copy(&q, 3, present->project, sizeof present->project);
     }
     groom_status status = query_end(&q);
     if (status == GROOM_OK && !found)
@@ -197,13 +213,15 @@ static groom_status write_move(struct connection *c, const struct store_job_move
         status = end_attempt(c, move, now, diag);
     if (status == GROOM_OK && move->groom)
         status = move->groom_expected ? groom_add_revision(c, move->groom, move->groom_expected, diag)
-                                      : groom_insert(c, move->groom, now, diag);
+                                      : groom_insert(c, move->groom, present.project, now, diag);
     if (status == GROOM_OK)
         status = update_job(c, move, now, diag);
     if (status == GROOM_OK)
         status = append_state_event(c, move, present.attempt, now, diag);
     if (status == GROOM_OK && store_job_state_is_end(move->to))
         status = webhooks_release(c, move->job_id, now, diag);
+    if (status == GROOM_OK && store_job_state_is_end(move->to))
+        status = audit_append(c, present.project, "job.end", move->job_id, store_job_state_name(move->to), now, diag);
     if (status == GROOM_OK && store_job_state_is_end(move->to))
         status = drop_checkpoint(c, move->job_id, garbage, diag);
     return status;

@@ -3,19 +3,17 @@
 
 #include "server/store/database.h"
 
-static groom_status run_for(struct connection *c, const char *sql, const char *id, int64_t *n_changed,
-                            struct groom_diag *diag)
+static groom_status run_for(struct connection *c, const char *sql, const char *id, struct groom_diag *diag)
 {
     struct query q = query_open(c, sql, diag);
     query_text(&q, 1, id);
-    return query_run(&q, n_changed);
+    return query_run(&q, NULL);
 }
 
 /* Reports that compare it with something, or something with it. */
 static groom_status delete_qualities(struct connection *c, const char *id, struct groom_diag *diag)
 {
-    return run_for(c, "DELETE FROM qualities WHERE subject = ?1 OR target = ?1 OR target LIKE ?1 || '/%'", id, NULL,
-                   diag);
+    return run_for(c, "DELETE FROM qualities WHERE subject = ?1 OR target = ?1 OR target LIKE ?1 || '/%'", id, diag);
 }
 
 /* --- uploads ------------------------------------------------------------------------------ */
@@ -39,16 +37,22 @@ static groom_status check_unused(struct connection *c, const char *id, struct gr
 static groom_status delete_asset(struct connection *c, enum store_asset_kind kind, const char *id,
                                  char sha256[STORE_HASH_SIZE], struct groom_diag *diag)
 {
-    struct query q = query_open(c, "DELETE FROM assets WHERE id = ?1 AND kind = ?2 RETURNING sha256", diag);
+    char project[STORE_PROJECT_SIZE];
+    struct query q = query_open(c, "DELETE FROM assets WHERE id = ?1 AND kind = ?2 RETURNING sha256, project", diag);
     query_text(&q, 1, id);
     query_integer(&q, 2, kind);
     bool found = query_row(&q);
     if (found)
         query_copy(&q, 0, sha256, STORE_HASH_SIZE);
+    if (found)
+        query_copy(&q, 1, project, sizeof project);
     groom_status status = query_run(&q, NULL);
     if (status == GROOM_OK && !found)
         status = groom_fail(diag, GROOM_ENOTFOUND, "there is no %s %.40s",
                             kind == STORE_STRANDS ? "upload of strands" : "head", id);
+    if (status == GROOM_OK)
+        status = audit_append(c, project, kind == STORE_STRANDS ? "strands.remove" : "head.remove", id, NULL,
+                              store_now_ms(), diag);
     return status;
 }
 
@@ -83,26 +87,33 @@ static groom_status delete_arrays(struct connection *c, const char *id, struct g
     return query_run(&arrays, NULL);
 }
 
+
+static groom_status delete_groom_row(struct connection *c, const char *id, struct groom_diag *diag)
+{
+    char project[STORE_PROJECT_SIZE] = "";
+    struct query q = query_open(c, "DELETE FROM grooms WHERE id = ?1 RETURNING project", diag);
+    query_text(&q, 1, id);
+    if (query_row(&q))
+        query_copy(&q, 0, project, sizeof project);
+    groom_status status = query_run(&q, NULL);
+    if (status == GROOM_OK && !project[0])
+        status = groom_fail(diag, GROOM_ENOTFOUND, "there is no groom %.40s", id);
+    return status == GROOM_OK ? audit_append(c, project, "groom.remove", id, NULL, store_now_ms(), diag) : status;
+}
+
 static groom_status delete_groom(struct connection *c, const char *id, struct groom_diag *diag)
 {
-    int64_t n_changed = 0;
     /* arrays are asked for by the rows that refer to them, so the reference is checked at the end */
     groom_status status = database_execute(c->db, "PRAGMA defer_foreign_keys = ON", diag);
     if (status == GROOM_OK)
         status = delete_arrays(c, id, diag);
     if (status == GROOM_OK)
-        status = run_for(c, "DELETE FROM revision_arrays WHERE groom_id = ?1", id, NULL, diag);
+        status = run_for(c, "DELETE FROM revision_arrays WHERE groom_id = ?1", id, diag);
     if (status == GROOM_OK)
-        status = run_for(c, "DELETE FROM qualities WHERE subject = ?1", id, NULL, diag);
-    if (status == GROOM_OK)
-        status = run_for(c, "DELETE FROM revisions WHERE groom_id = ?1", id, NULL, diag);
+        status = run_for(c, "DELETE FROM revisions WHERE groom_id = ?1", id, diag);
     if (status == GROOM_OK)
         status = delete_qualities(c, id, diag);
-    if (status == GROOM_OK)
-        status = run_for(c, "DELETE FROM grooms WHERE id = ?1", id, &n_changed, diag);
-    if (status == GROOM_OK && n_changed == 0)
-        status = groom_fail(diag, GROOM_ENOTFOUND, "there is no groom %.40s", id);
-    return status;
+    return status == GROOM_OK ? delete_groom_row(c, id, diag) : status;
 }
 
 groom_status store_groom_remove(struct store *store, const char *id, struct groom_diag *diag)

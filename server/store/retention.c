@@ -31,9 +31,8 @@ static groom_status retire_keys(struct connection *c, int64_t before, uint32_t m
 {
     int64_t n_changed = 0;
     struct query q = query_open(c,
-                                "DELETE FROM idempotency_keys WHERE rowid IN"
-                                " (SELECT k.rowid FROM idempotency_keys AS k JOIN jobs ON jobs.id = k.job_id"
-                                "  WHERE k.created < ?1 AND jobs.state >= 2 LIMIT ?2)", diag);
+                                "DELETE FROM keys WHERE (project, key) IN"
+                                " (SELECT project, key FROM keys WHERE expires < ?1 LIMIT ?2)", diag);
     query_integer(&q, 1, before);
     query_integer(&q, 2, max_rows);
     groom_status status = query_run(&q, &n_changed);
@@ -50,8 +49,8 @@ static groom_status retire_jobs(struct connection *c, int64_t before, uint32_t m
     static const char *const tables[] = {"DELETE FROM events WHERE job_id IN " THOSE,
                                          "DELETE FROM losses WHERE job_id IN " THOSE,
                                          "DELETE FROM checkpoints WHERE job_id IN " THOSE,
-                                         "DELETE FROM idempotency_keys WHERE job_id IN " THOSE,
                                          "DELETE FROM webhooks WHERE job_id IN " THOSE,
+                                         "DELETE FROM keys WHERE subject IN " THOSE,
                                          "DELETE FROM attempts WHERE job_id IN " THOSE,
                                          "DELETE FROM jobs WHERE id IN " THOSE};
     groom_status status = GROOM_OK;

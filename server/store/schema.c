@@ -101,7 +101,40 @@ static const char version_7[] =
     "CREATE INDEX webhooks_by_job ON webhooks (job_id);"
     "CREATE INDEX webhooks_due ON webhooks (due) WHERE state = 0;";
 
-const char *const schema_steps[] = {version_1, version_2, version_3, version_4, version_5, version_6, version_7};
+/* Everything belongs to a project. `owner` is who made it, for limits and fair turns: a token's id, or
+ * the project where none was asked for. */
+static const char version_8[] =
+    "ALTER TABLE assets ADD COLUMN project TEXT NOT NULL DEFAULT 'default';"
+    "ALTER TABLE assets ADD COLUMN owner TEXT NOT NULL DEFAULT 'default';"
+    "ALTER TABLE grooms ADD COLUMN project TEXT NOT NULL DEFAULT 'default';"
+    "ALTER TABLE jobs ADD COLUMN project TEXT NOT NULL DEFAULT 'default';"
+    "ALTER TABLE jobs ADD COLUMN owner TEXT NOT NULL DEFAULT 'default';"
+    "ALTER TABLE uploads ADD COLUMN project TEXT NOT NULL DEFAULT 'default';"
+    "ALTER TABLE uploads ADD COLUMN owner TEXT NOT NULL DEFAULT 'default';"
+    "DROP INDEX assets_by_kind;"
+    "CREATE INDEX assets_by_project ON assets (project, kind, seq);"
+    "CREATE INDEX assets_by_owner ON assets (owner, n_bytes);"
+    "CREATE INDEX grooms_by_project ON grooms (project, seq);"
+    "CREATE INDEX jobs_by_project ON jobs (project, seq);"
+    "CREATE INDEX jobs_by_owner ON jobs (owner, state);"
+    /* whose turn was when, counted */
+    "CREATE TABLE turns (owner TEXT NOT NULL PRIMARY KEY, taken INTEGER NOT NULL) STRICT;"
+    /* `subject` and `number` are what the request made: a job, or a groom's revision */
+    "CREATE TABLE keys ("
+    "  project TEXT NOT NULL, key TEXT NOT NULL, request_hash TEXT NOT NULL, subject TEXT NOT NULL,"
+    "  number INTEGER NOT NULL, expires INTEGER NOT NULL, PRIMARY KEY (project, key)) STRICT, WITHOUT ROWID;"
+    "CREATE INDEX keys_by_end ON keys (expires);"
+    "DROP TABLE idempotency_keys;" /* their hashes were of another kind; none was older than its client */
+    "CREATE TABLE audit ("
+    "  seq INTEGER PRIMARY KEY AUTOINCREMENT, created INTEGER NOT NULL, request TEXT NOT NULL,"
+    "  token TEXT NOT NULL, name TEXT NOT NULL, project TEXT NOT NULL, action TEXT NOT NULL,"
+    "  subject TEXT NOT NULL, detail TEXT NOT NULL) STRICT;"
+    "CREATE TRIGGER audit_is_not_changed BEFORE UPDATE ON audit"
+    " BEGIN SELECT RAISE(ABORT, 'the audit is only added to'); END;"
+    "CREATE TRIGGER audit_is_not_cut BEFORE DELETE ON audit"
+    " BEGIN SELECT RAISE(ABORT, 'the audit is only added to'); END;";
+
+const char *const schema_steps[] = {version_1, version_2, version_3, version_4, version_5, version_6, version_7, version_8};
 const int schema_version = sizeof schema_steps / sizeof schema_steps[0];
 
 static groom_status read_version(sqlite3 *db, int *version, struct groom_diag *diag)

@@ -23,6 +23,13 @@
 #define STORE_ID_SIZE   32 /* "job_" and the like with 20 characters, and room */
 #define STORE_HASH_SIZE 65 /* SHA-256 in lower-case hexadecimal */
 
+/* Every upload, groom and job belongs to a project. "" and NULL name the default one where something is
+ * made and where there is a list; where one thing is looked for, NULL means any (the daemon's own look). */
+#define STORE_PROJECT_SIZE    64
+#define STORE_DEFAULT_PROJECT "default"
+/* Who made it, for limits and fair turns: a token's id, or the project where no token was asked for. */
+#define STORE_OWNER_SIZE 64
+
 struct store;
 
 /* Open or make the database file `path`, mend it to the present schema, check it.
@@ -41,6 +48,21 @@ int64_t store_now_ms(void);
 /* RFC 3339 in UTC with milliseconds: "2026-01-31T12:00:00.250Z". */
 void store_time_text(int64_t time_ms, char text[32]);
 
+/* --- projects ----------------------------------------------------------------------- */
+
+/* The project of an upload, a groom or a job. What belongs to another project than asks for it is to be
+ * answered as what does not exist.
+ * returns  GROOM_ENOTFOUND */
+GROOM_MUST_CHECK groom_status store_project_of(struct store *store, const char *id,
+                                               char project[STORE_PROJECT_SIZE], struct groom_diag *diag);
+
+struct store_usage {
+    uint64_t n_bytes;  /* of the owner's uploads */
+    uint32_t n_queued; /* of its jobs */
+};
+GROOM_MUST_CHECK groom_status store_usage_of(struct store *store, const char *owner, struct store_usage *usage,
+                                             struct groom_diag *diag);
+
 /* --- pages ---------------------------------------------------------------------------- */
 
 /* Lists go from the newest to the oldest. `before` is the `next` of the page before, or 0 for the
@@ -57,6 +79,7 @@ enum store_asset_kind { STORE_STRANDS, STORE_HEAD };
 struct store_asset {
     char id[STORE_ID_SIZE];       /* "str_…", "head_…" */
     enum store_asset_kind kind;
+    char project[STORE_PROJECT_SIZE], owner[STORE_OWNER_SIZE]; /* "": the default */
     char sha256[STORE_HASH_SIZE]; /* its blob */
     uint64_t n_bytes;
     char *format;                 /* as recognised: "hair" */
@@ -73,19 +96,21 @@ struct store_asset_list {
     int64_t next;
 };
 
-/* The id of these bytes read in this way, always the same: "str_" and a hash of (sha256, format,
- * unit_m, up). `format` is what was asked for ("" or NULL: recognise it). */
-void store_asset_id(enum store_asset_kind kind, const char *sha256, const char *format, double unit_m,
+/* The id of these bytes read in this way in this project, always the same: "str_" and a hash of all of
+ * these. `format` is what was asked for ("" or NULL: recognise it). Projects that upload the same bytes
+ * share the blob and neither ids nor rows, so that none learns what another has. */
+void store_asset_id(const char *project, enum store_asset_kind kind, const char *sha256, const char *format, double unit_m,
                     char up, char id[STORE_ID_SIZE]);
 /* Insert unless a row of this id is there already; *created says which. created_ms 0 means now.
- * Its blob must be committed before. */
+ * Its blob must be committed before. max_bytes: of all that its owner has; 0: no limit.
+ * returns  GROOM_ELIMIT */
 GROOM_MUST_CHECK groom_status store_asset_put(struct store *store, const struct store_asset *asset,
-                                              bool *created, struct groom_diag *diag);
-/* returns  GROOM_ENOTFOUND, also where the id is of the other kind */
-GROOM_MUST_CHECK groom_status store_asset_get(struct store *store, enum store_asset_kind kind, const char *id,
-                                              struct store_asset *asset, struct groom_diag *diag);
-GROOM_MUST_CHECK groom_status store_assets_list(struct store *store, enum store_asset_kind kind,
-                                                struct store_page page, struct store_asset_list *list,
+                                              uint64_t max_bytes, bool *created, struct groom_diag *diag);
+/* returns  GROOM_ENOTFOUND, also where the id is of the other kind or another project */
+GROOM_MUST_CHECK groom_status store_asset_get(struct store *store, const char *project, enum store_asset_kind kind,
+                                              const char *id, struct store_asset *asset, struct groom_diag *diag);
+GROOM_MUST_CHECK groom_status store_assets_list(struct store *store, const char *project,
+                                                enum store_asset_kind kind, struct store_page page, struct store_asset_list *list,
                                                 struct groom_diag *diag);
 /* `garbage` is its blob, for the caller to collect. Grooms that were made of it have what they need.
  * returns  GROOM_ENOTFOUND, GROOM_ECONFLICT (a job that has not ended needs it; detail names one) */
@@ -99,6 +124,7 @@ void store_asset_list_finish(struct store_asset_list *list);
 /* An upload under way (server/uploads): a file of its own until it is used, then a blob. */
 struct store_upload {
     char id[STORE_ID_SIZE];       /* "upl_…" */
+    char project[STORE_PROJECT_SIZE], owner[STORE_OWNER_SIZE]; /* "": the default */
     uint64_t n_bytes;             /* what it is to be */
     uint64_t n_durable;           /* of them on the disk: what its sender is told */
     char sha256[STORE_HASH_SIZE]; /* its blob once it was used; "": still a file */
@@ -144,6 +170,7 @@ struct store_array {
 /* A revision to write; everything borrowed for the call. */
 struct store_revision_new {
     const char *groom_id;             /* "grm_…" */
+    const char *project;              /* of a new groom */
     const char *name;                 /* of the groom from now on */
     const char *document;             /* JSON, large arrays replaced by references */
     const char *note;                 /* what made it: "fit", "import", "patch"; NULL: "" */
@@ -200,7 +227,7 @@ GROOM_MUST_CHECK groom_status store_array_get(struct store *store, const char *s
 GROOM_MUST_CHECK groom_status store_revisions_list(struct store *store, const char *groom_id,
                                                    struct store_page page, struct store_revision_list *list,
                                                    struct groom_diag *diag);
-GROOM_MUST_CHECK groom_status store_grooms_list(struct store *store, struct store_page page,
+GROOM_MUST_CHECK groom_status store_grooms_list(struct store *store, const char *project, struct store_page page,
                                                 struct store_groom_list *list, struct groom_diag *diag);
 /* With all its revisions, and the arrays that no other groom has. returns  GROOM_ENOTFOUND */
 GROOM_MUST_CHECK groom_status store_groom_remove(struct store *store, const char *id, struct groom_diag *diag);
@@ -249,8 +276,9 @@ bool store_job_state_is_end(enum store_job_state state);
 struct store_job {
     char id[STORE_ID_SIZE];
     char *kind;             /* "fit" */
+    char project[STORE_PROJECT_SIZE], owner[STORE_OWNER_SIZE];
     enum store_job_state state;
-    int32_t priority;       /* larger first; then the older first */
+    int32_t priority;       /* larger first; then owners in turn; then the older first */
     int64_t queue_position; /* jobs ahead of it; -1 where it is not queued */
     char *request;          /* JSON object: {"strands":"str_…","head":"head_…"} */
     char *options;          /* JSON object, defaults filled in */
@@ -282,21 +310,22 @@ struct store_job_new {
     const char *kind;
     const char *request, *options; /* JSON objects */
     int32_t priority;
-    const char *idempotency_key;   /* or NULL */
-    const char *request_hash;      /* of what the key stands for; with a key only */
     const struct store_webhook_new *webhooks; /* or NULL */
     size_t n_webhooks;
+    const char *project, *owner;   /* NULL: the default */
+    uint32_t max_queued;           /* jobs that may wait, of all owners; 0: no limit */
+    uint32_t max_queued_of_owner;  /* 0: no limit */
 };
 
-/* Queue a job, unless its idempotency key is known: then *id is that job's and *created false.
- * returns  GROOM_ECONFLICT where the key stands for another request */
+/* returns  GROOM_ELIMIT where a queue is full */
 GROOM_MUST_CHECK groom_status store_job_create(struct store *store, const struct store_job_new *job,
-                                               char id[STORE_ID_SIZE], bool *created, struct groom_diag *diag);
+                                               struct groom_diag *diag);
 /* returns  GROOM_ENOTFOUND */
 GROOM_MUST_CHECK groom_status store_job_get(struct store *store, const char *id, struct store_job *job,
                                             struct groom_diag *diag);
 /* state: NULL for any. */
-GROOM_MUST_CHECK groom_status store_jobs_list(struct store *store, const enum store_job_state *state,
+GROOM_MUST_CHECK groom_status store_jobs_list(struct store *store, const char *project,
+                                              const enum store_job_state *state,
                                               struct store_page page, struct store_job_list *list,
                                               struct groom_diag *diag);
 void store_job_finish(struct store_job *job);
@@ -513,6 +542,46 @@ GROOM_MUST_CHECK groom_status store_losses_list(struct store *store, const char 
                                                 struct store_loss_list *list, struct groom_diag *diag);
 void store_loss_list_finish(struct store_loss_list *list);
 
+/* --- idempotency keys ----------------------------------------------------------------------------------- */
+
+/* A request that carries an Idempotency-Key (struct actor) has it written with the job or the revision
+ * that it makes, in the same transaction; it stands for that until it expires. A second one that comes
+ * at the same moment gets GROOM_ECONFLICT and finds what the first has made. */
+struct store_key {
+    char subject[STORE_ID_SIZE]; /* "job_…" or "grm_…" */
+    uint32_t number;             /* of the revision; 0 for a job */
+};
+/* returns  GROOM_ENOTFOUND (a new key), GROOM_ECONFLICT (it stands for another request) */
+GROOM_MUST_CHECK groom_status store_key_find(struct store *store, const char *project, const char *key,
+                                             const char *request_hash, struct store_key *found,
+                                             struct groom_diag *diag);
+
+/* --- the audit --------------------------------------------------------------------------------------------- */
+
+/* Who (struct actor) changed what, and when. The calls above write it with the change itself; nothing
+ * takes a row away. */
+struct store_audit_entry {
+    int64_t sequence, created_ms;
+    char *request, *token, *name; /* who; see server/actor.h */
+    char *project;                /* whose */
+    char *action;                 /* "strands.upload", "groom.revise", "job.cancel" */
+    char *subject;                /* id of what was changed */
+    char *detail;                 /* "revision 3", or "" */
+};
+
+struct store_audit_list {
+    struct store_audit_entry *items;
+    size_t n;
+    int64_t next;
+};
+
+/* For changes outside of the store. */
+GROOM_MUST_CHECK groom_status store_audit_add(struct store *store, const char *project, const char *action,
+                                              const char *subject, const char *detail, struct groom_diag *diag);
+GROOM_MUST_CHECK groom_status store_audit_list(struct store *store, struct store_page page,
+                                               struct store_audit_list *list, struct groom_diag *diag);
+void store_audit_list_finish(struct store_audit_list *list);
+
 /* --- keeping house ------------------------------------------------------------------------------------------ */
 
 struct store_counts {
@@ -546,7 +615,7 @@ GROOM_MUST_CHECK groom_status store_copy_drop_upload(const char *path, const cha
 /* What goes: rows of jobs that ended before these times; 0: nothing of the kind. */
 struct store_retention {
     int64_t events_before_ms; /* progress and loss events; states, stages and losses stay */
-    int64_t keys_before_ms;   /* idempotency keys that are as old and whose job has ended */
+    int64_t keys_before_ms;   /* idempotency keys that expire before that */
     int64_t jobs_before_ms;   /* jobs with all that is theirs; not the grooms that they made */
 };
 struct store_retired {

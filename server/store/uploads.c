@@ -3,7 +3,7 @@
 
 #include "server/store/database.h"
 
-#define COLUMNS "id, n_bytes, n_durable, sha256, metadata, created, expires"
+#define COLUMNS "id, n_bytes, n_durable, sha256, metadata, created, expires, project, owner"
 
 static void read_upload(struct query *q, struct store_upload *upload)
 {
@@ -14,6 +14,8 @@ static void read_upload(struct query *q, struct store_upload *upload)
     upload->metadata = query_string(q, 4);
     upload->created_ms = query_int64(q, 5);
     upload->expires_ms = query_int64(q, 6);
+    query_copy(q, 7, upload->project, sizeof upload->project);
+    query_copy(q, 8, upload->owner, sizeof upload->owner);
 }
 
 static groom_status no_such_upload(const char *id, struct groom_diag *diag)
@@ -23,17 +25,20 @@ static groom_status no_such_upload(const char *id, struct groom_diag *diag)
 
 groom_status store_upload_create(struct store *store, const struct store_upload *upload, struct groom_diag *diag)
 {
+    const char *project = project_or_default(upload->project);
     struct connection *c;
     groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    struct query q = query_open(c, "INSERT INTO uploads (id, n_bytes, metadata, created, expires)"
-                                       " VALUES (?1, ?2, ?3, ?4, ?5)", diag);
+    struct query q = query_open(c, "INSERT INTO uploads (id, n_bytes, metadata, created, expires, project, owner)"
+                                   " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)", diag);
     query_text(&q, 1, upload->id);
     query_integer(&q, 2, (int64_t)upload->n_bytes);
     query_text(&q, 3, upload->metadata ? upload->metadata : "");
     query_integer(&q, 4, upload->created_ms);
     query_integer(&q, 5, upload->expires_ms);
+    query_text(&q, 6, project);
+    query_text(&q, 7, upload->owner[0] ? upload->owner : project);
     return transaction_end(c, query_run(&q, NULL), diag);
 }
 

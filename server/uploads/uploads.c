@@ -41,10 +41,12 @@ static groom_status make_file(struct uploads *uploads, const char *id, struct gr
     return status;
 }
 
-groom_status uploads_begin(struct uploads *uploads, uint64_t n_bytes, const char *metadata,
-                           struct store_upload *upload, struct groom_diag *diag)
+groom_status uploads_begin(struct uploads *uploads, const char *project, const char *owner, uint64_t n_bytes,
+                           const char *metadata, struct store_upload *upload, struct groom_diag *diag)
 {
     struct store_upload made = {.n_bytes = n_bytes, .created_ms = store_now_ms()};
+    snprintf(made.project, sizeof made.project, "%s", project ? project : "");
+    snprintf(made.owner, sizeof made.owner, "%s", owner ? owner : "");
     made.expires_ms = made.created_ms + uploads->options.expiry_ms;
     groom_status status = store_make_id("upl_", made.id);
     if (status == GROOM_OK && !(made.metadata = strdup(metadata ? metadata : "")))

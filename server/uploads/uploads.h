@@ -38,8 +38,9 @@ GROOM_MUST_CHECK groom_status uploads_create(const struct uploads_options *optio
 void uploads_destroy(struct uploads *uploads);
 
 /* A new upload of n_bytes. upload: the caller's, store_upload_finish */
-GROOM_MUST_CHECK groom_status uploads_begin(struct uploads *uploads, uint64_t n_bytes, const char *metadata,
-                                            struct store_upload *upload, struct groom_diag *diag);
+GROOM_MUST_CHECK groom_status uploads_begin(struct uploads *uploads, const char *project, const char *owner,
+                                            uint64_t n_bytes, const char *metadata, struct store_upload *upload,
+                                            struct groom_diag *diag);
 /* What is known of it; everything that has come in by now is made durable and counted.
  * returns  GROOM_ENOTFOUND */
 GROOM_MUST_CHECK groom_status uploads_look(struct uploads *uploads, const char *id, struct store_upload *upload,

@@ -29,8 +29,11 @@ test('the table of routes and the description name the same calls', () => {
 test('every operation answers as it is described', async (t) => {
   const daemon = await startIdleDaemon(t);
   const get = (path, status = 200, options) => expect(daemon, status, 'GET', path, options);
-  for (const path of ['/', '/studio/studio.js', '/status', '/status.css', '/healthz', '/readyz', '/metrics', '/openapi.json', '/v1/options', '/v1/strands', '/v1/heads', '/v1/jobs', '/v1/grooms'])
+  for (const path of ['/', '/studio/studio.js', '/status', '/status.css', '/healthz', '/readyz', '/metrics', '/openapi.json', '/v1/options', '/v1/session', '/v1/audit', '/v1/strands', '/v1/heads', '/v1/jobs', '/v1/grooms'])
     await get(path);
+
+  await expect(daemon, 201, 'POST', '/v1/session');
+  await expect(daemon, 204, 'DELETE', '/v1/session');
 
   const strands = await upload(daemon);
   const head = (await expect(daemon, 201, 'POST', '/v1/heads', { body: head_obj() })).json;

@@ -79,9 +79,8 @@ static groom_status bench_blobs(const char *folder)
 
 static groom_status bench_store(const char *folder)
 {
-    char path[512], id[STORE_ID_SIZE], made[STORE_ID_SIZE];
+    char path[512], id[STORE_ID_SIZE];
     struct store *store;
-    bool created;
     const int n = 500;
     snprintf(path, sizeof path, "%s/bench.db", folder);
     remove(path);
@@ -92,7 +91,7 @@ static groom_status bench_store(const char *folder)
     for (int i = 0; status == GROOM_OK && i < n; i++) {
         struct store_job_new job = {.id = id, .kind = "fit", .request = "{}", .options = "{}"};
         if ((status = store_make_id("job_", id)) == GROOM_OK)
-            status = store_job_create(store, &job, made, &created, NULL);
+            status = store_job_create(store, &job, NULL);
     }
     printf("figure job_commits_per_s %.0f 1/s durable job creations, one thread\n", n / (seconds() - start));
     store_close(store);

@@ -82,11 +82,11 @@ static int measure(void)
 {
     struct store_job_new job = {.id = "job_bench", .kind = "fit", .request = "{}", .options = "{}"};
     struct store_attempt_ref ref;
-    char id[STORE_ID_SIZE];
-    bool created, taken;
+    const char *id = job.id;
+    bool taken;
     int64_t next;
     pthread_t reporter, writer;
-    if (store_job_create(store, &job, id, &created, NULL) != GROOM_OK ||
+    if (store_job_create(store, &job, NULL) != GROOM_OK ||
         store_job_take(store, "token", &ref, &taken, &next, NULL) != GROOM_OK || !taken)
         return 1;
     pthread_create(&reporter, NULL, report_progress, &ref);

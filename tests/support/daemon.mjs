@@ -122,8 +122,8 @@ export class Daemon {
   }
 }
 
-/** options: args of groomd, env. */
-export async function startDaemon(t, { args = [], env = {} } = {}) {
+/** options: args of groomd, env, prepare(data folder). */
+export async function startDaemon(t, { args = [], env = {}, prepare } = {}) {
   const folder = mkdtempSync(join(tmpdir(), 'groomd-test-'));
   const daemon = new Daemon(folder, args, env);
   t.after(async () => {
@@ -138,6 +138,7 @@ export async function startDaemon(t, { args = [], env = {} } = {}) {
       rmSync(folder, { recursive: true, force: true });
     }
   });
+  await prepare?.(daemon.data); // before it starts
   return daemon.start();
 }
 

@@ -45,7 +45,7 @@ static void set_up(struct fixture *fixture)
         .store = fixture->store, .worker_path = "/nonexistent", .temporary_folder = fixture->folder};
     ck_ok(grooms_create(&options, &fixture->grooms, &diag));
     char *json = document_text();
-    ck_ok(grooms_import(fixture->grooms, json, strlen(json), fixture->id, &diag));
+    ck_ok(grooms_import(fixture->grooms, NULL, json, strlen(json), fixture->id, &diag));
     free(json);
 }
 
@@ -133,7 +133,7 @@ START_TEST(a_document_got_and_imported_again_gives_the_same_strands)
     set_up(&fixture);
     export(&fixture, 0, 0, &first);
     ck_ok(grooms_document(fixture.grooms, fixture.id, 0, true, &json, &n, &number, NULL));
-    ck_ok(grooms_import(fixture.grooms, json, n, fixture.id, NULL));
+    ck_ok(grooms_import(fixture.grooms, NULL, json, n, fixture.id, NULL));
     export(&fixture, 0, 0, &second);
     ck_assert_uint_eq(first.n, second.n);
     ck_assert_mem_eq(first.bytes, second.bytes, first.n);

@@ -100,9 +100,7 @@ static void submit(char id[STORE_ID_SIZE])
 {
     struct jobs_request request = {.kind = "fit", .inputs = "{\"strands\":\"str_a\"}", .options = "{\"seed\":1}"};
     struct store_job job;
-    bool created = false;
-    ck_ok(jobs_submit(jobs, &request, &job, &created, &diag));
-    ck_assert(created);
+    ck_ok(jobs_submit(jobs, &request, &job, &diag));
     memcpy(id, job.id, STORE_ID_SIZE);
     store_job_finish(&job);
 }
@@ -206,29 +204,6 @@ static struct store_attempt_ref take(char token[WORK_TOKEN_SIZE])
 
 /* --- submitting ------------------------------------------------------------------------------ */
 
-START_TEST(a_key_with_the_same_request_is_the_same_job)
-{
-    begin();
-    struct jobs_request request = {.kind = "fit", .inputs = "{}", .options = "{}", .idempotency_key = "k"};
-    struct store_job first, second;
-    bool created = false;
-    ck_ok(jobs_submit(jobs, &request, &first, &created, &diag));
-    ck_assert(created);
-    ck_ok(jobs_submit(jobs, &request, &second, &created, &diag));
-    ck_assert(!created);
-    ck_assert_str_eq(first.id, second.id);
-    store_job_finish(&first);
-    store_job_finish(&second);
-    request.options = "{\"seed\":2}";
-    ck_status(jobs_submit(jobs, &request, &second, &created, &diag), GROOM_ECONFLICT);
-    request.idempotency_key = NULL;
-    ck_ok(jobs_submit(jobs, &request, &second, &created, &diag));
-    ck_assert(created);
-    store_job_finish(&second);
-    end();
-}
-END_TEST
-
 START_TEST(a_job_reads_as_the_contract_names_it)
 {
     begin();
@@ -270,14 +245,13 @@ START_TEST(an_attempt_is_told_its_job_its_inputs_and_its_checkpoint)
     char token[WORK_TOKEN_SIZE], hash[BLOBS_HASH_SIZE], *text;
     struct store_asset asset = {.kind = STORE_STRANDS, .n_bytes = 7, .format = (char *)"hair", .unit_m = 0.01, .up = 'z'};
     memset(asset.sha256, 'a', 64);
-    store_asset_id(STORE_STRANDS, asset.sha256, "", 0.01, 'z', asset.id);
-    ck_ok(store_asset_put(store, &asset, NULL, &diag));
+    store_asset_id(NULL, STORE_STRANDS, asset.sha256, "", 0.01, 'z', asset.id);
+    ck_ok(store_asset_put(store, &asset, 0, NULL, &diag));
     char request[64];
     snprintf(request, sizeof request, "{\"strands\":\"%s\"}", asset.id);
     struct jobs_request submitted = {.kind = "fit", .inputs = request, .options = "{\"seed\":7}"};
     struct store_job job;
-    bool created;
-    ck_ok(jobs_submit(jobs, &submitted, &job, &created, &diag));
+    ck_ok(jobs_submit(jobs, &submitted, &job, &diag));
     store_job_finish(&job);
     struct store_attempt_ref ref = take(token);
     checkpoint(&ref, "half", 2, hash);
@@ -422,7 +396,7 @@ START_TEST(a_result_is_taken_once)
     ck_assert_str_eq(job.result, "{\"groom\":\"grm_a\",\"revision\":1}");
     store_job_finish(&job);
     struct store_groom_list grooms;
-    ck_ok(store_grooms_list(store, (struct store_page){0}, &grooms, &diag));
+    ck_ok(store_grooms_list(store, NULL, (struct store_page){0}, &grooms, &diag));
     ck_assert_uint_eq(grooms.n, 1);
     store_groom_list_finish(&grooms);
     end();
@@ -557,7 +531,7 @@ START_TEST(a_worker_that_dies_is_followed_by_another_from_its_checkpoint)
     struct store_attempt_ref second, stale;
     bool cancel;
     struct store_asset asset = {.id = "str_a", .kind = STORE_STRANDS, .unit_m = 1, .up = 'y'};
-    ck_ok(store_asset_put(store, &asset, NULL, &diag));
+    ck_ok(store_asset_put(store, &asset, 0, NULL, &diag));
     supervise(SAY_TOKEN "[ -e $D/once ] && exec sleep 60; touch $D/once; while [ ! -e $D/die ]; do sleep 0.01; done;"
               " kill -9 $$", quick);
     submit(id);
@@ -824,9 +798,8 @@ static void *submit_and_cancel(void *user)
         struct jobs_request request = {.kind = "fit", .inputs = "{}", .options = "{}"};
         struct jobs_watch *watch;
         struct store_job job, after;
-        bool created;
         int n_woken = 0;
-        if (jobs_submit(jobs, &request, &job, &created, NULL) != GROOM_OK)
+        if (jobs_submit(jobs, &request, &job, NULL) != GROOM_OK)
             return (void *)(uintptr_t)"a job was refused";
         if (jobs_watch(jobs, job.id, count_up, &n_woken, &watch) != GROOM_OK)
             return (void *)(uintptr_t)"no watch";
@@ -869,7 +842,7 @@ START_TEST(many_submit_watch_and_cancel_at_once)
 }
 END_TEST
 
-TEST_SUITE("jobs", a_key_with_the_same_request_is_the_same_job, a_job_reads_as_the_contract_names_it,
+TEST_SUITE("jobs", a_job_reads_as_the_contract_names_it,
            an_attempt_is_told_its_job_its_inputs_and_its_checkpoint, progress_leaves_events_and_losses,
            a_progress_message_that_is_wrong_is_refused_by_its_field,
            a_checkpoint_takes_the_place_of_the_one_before,

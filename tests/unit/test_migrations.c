@@ -57,14 +57,14 @@ static void make_database(const char *path, int version)
 static void read_assets(struct store *store)
 {
     struct store_asset asset;
-    ck_ok(store_asset_get(store, STORE_STRANDS, "str_old", &asset, &diag));
+    ck_ok(store_asset_get(store, NULL, STORE_STRANDS, "str_old", &asset, &diag));
     ck_assert_str_eq(asset.name, "Brows of Ann");
     ck_assert_str_eq(asset.metadata, "{\"strands\":3}");
     ck_assert_int_eq(asset.up, 'z');
     ck_assert(asset.unit_m > 0.0099 && asset.unit_m < 0.0101);
     ck_assert_int_eq(asset.created_ms, TIME);
     store_asset_finish(&asset);
-    ck_ok(store_asset_get(store, STORE_HEAD, "head_old", &asset, &diag));
+    ck_ok(store_asset_get(store, NULL, STORE_HEAD, "head_old", &asset, &diag));
     ck_assert_uint_eq(asset.n_bytes, 99);
     store_asset_finish(&asset);
 }

@@ -6,6 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "server/actor.h"
 #include "server/housekeeper.h"
 #include "server/jobs/jobs.h"
 #include "server/uploads/uploads.h"
@@ -34,12 +35,11 @@ static void close_all(void)
 
 static void make_job(const char *id, const char *key)
 {
-    struct store_job_new job = {.id = id, .kind = "fit", .request = "{\"strands\":\"str_a\"}", .options = "{}",
-                                .idempotency_key = key, .request_hash = key};
-    char made[STORE_ID_SIZE];
-    bool created;
-    ck_ok(store_job_create(store, &job, made, &created, &diag));
-    ck_assert(created);
+    struct store_job_new job = {.id = id, .kind = "fit", .request = "{\"strands\":\"str_a\"}", .options = "{}"};
+    const struct actor actor = {.name = "ann", .key = key, .key_hash = key, .key_lifetime_ms = 500};
+    actor_set(&actor);
+    ck_ok(store_job_create(store, &job, &diag));
+    actor_set(NULL);
 }
 
 static void run_job(void)
@@ -84,7 +84,7 @@ START_TEST(progress_goes_history_stays)
     keep.events_before_ms = keep.keys_before_ms = store_now_ms() + 1000;
     ck_ok(store_retire(store, &keep, 100, &retired, &diag));
     ck_assert_uint_eq(retired.n_event_streams, 1);
-    ck_assert_uint_eq(retired.n_keys, 1); /* not that of the job that waits */
+    ck_assert_uint_eq(retired.n_keys, 2);
     ck_assert_uint_eq(count_events("job_ended"), 4);
     ck_assert_uint_eq(count_events("job_waits"), 1);
     ck_ok(store_losses_list(store, "job_ended", &losses, &diag));
@@ -156,7 +156,7 @@ static void put_bytes(const char *text, bool in_pieces, char sha256[BLOBS_HASH_S
         ck_ok(blobs_commit(writer, NULL, sha256, NULL));
         return;
     }
-    ck_ok(uploads_begin(uploads, strlen(text), "", &upload, NULL));
+    ck_ok(uploads_begin(uploads, NULL, NULL, strlen(text), "", &upload, NULL));
     ck_ok(upload_open(uploads, upload.id, 0, NULL, &piece, &refusal, NULL));
     ck_ok(upload_write(piece, text, strlen(text), NULL));
     ck_ok(upload_finish(piece, &n, &expires, &refusal, NULL));
@@ -179,7 +179,7 @@ static void *use(void *user)
         snprintf(text, sizeof text, "%u", rand_r(&seed) % 3);
         snprintf(asset.id, sizeof asset.id, "str_%zu_%d", (size_t)user, i);
         put_bytes(text, rand_r(&seed) % 2, asset.sha256);
-        ck_ok(store_asset_put(store, &asset, &created, NULL));
+        ck_ok(store_asset_put(store, &asset, 0, &created, NULL));
         blobs_unpin(blobs, asset.sha256);
         ck_ok(blobs_read(blobs, asset.sha256, &fd, &n, NULL));
         ck_assert_uint_eq(n, 1);

@@ -421,8 +421,7 @@ static void submit_job(char id[STORE_ID_SIZE])
 {
     const struct jobs_request request = {.kind = "fit", .inputs = "{\"strands\":\"str_a\"}", .options = "{}"};
     struct store_job job;
-    bool created;
-    ck_ok(jobs_submit(jobs, &request, &job, &created, &diag));
+    ck_ok(jobs_submit(jobs, &request, &job, &diag));
     memcpy(id, job.id, STORE_ID_SIZE);
     store_job_finish(&job);
 }
@@ -503,7 +502,7 @@ START_TEST(a_restarted_run_takes_the_attempt_over)
     struct store_asset asset = {.kind = STORE_STRANDS, .id = "str_a", .sha256 = "ab", .format = (char[]){"hair"},
                                 .unit_m = 1, .up = 'y', .name = (char[]){""}, .metadata = (char[]){"{}"}};
     open_daemon();
-    ck_ok(store_asset_put(store, &asset, &(bool){0}, &diag));
+    ck_ok(store_asset_put(store, &asset, 0, &(bool){0}, &diag));
     submit_job(id);
     wait_text("jobs", id);
     read_token(token);

@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "server/actor.h"
 #include "server/store/database.h"
 #include "tests/support/folder.h"
 #include "tests/support/test.h"
@@ -44,11 +45,7 @@ static void make_job(struct store *store, const char *id, int32_t priority)
 {
     struct store_job_new job = {.id = id, .kind = "fit", .request = "{\"strands\":\"str_a\"}",
                                 .options = "{\"seed\":1}", .priority = priority};
-    char made[STORE_ID_SIZE];
-    bool created = false;
-    ck_ok(store_job_create(store, &job, made, &created, &diag));
-    ck_assert(created);
-    ck_assert_str_eq(made, id);
+    ck_ok(store_job_create(store, &job, &diag));
 }
 
 static struct store_attempt_ref take(struct store *store, const char *token_hash)
@@ -177,6 +174,41 @@ START_TEST(a_step_that_fails_leaves_the_version_before_it)
 }
 END_TEST
 
+/* What was there before there were projects is the default one's. */
+START_TEST(the_first_schema_becomes_the_present_one)
+{
+    struct store *store;
+    struct store_asset asset;
+    struct store_job job;
+    char project[STORE_PROJECT_SIZE];
+    sqlite3 *db;
+    test_folder_make();
+    ck_assert_int_eq(sqlite3_open(test_folder_path("groomd.db"), &db), SQLITE_OK);
+    ck_ok(schema_migrate(db, schema_steps, 1, &diag));
+    ck_ok(database_execute(db,
+                           "INSERT INTO assets (id, kind, sha256, n_bytes, format, unit_m, up, name, metadata, created)"
+                           " VALUES ('str_a', 0, '" HASH_A "', 5, 'hair', 1, 'y', 'bob', '{}', 7);"
+                           "INSERT INTO jobs (id, kind, state, priority, request, options, created)"
+                           " VALUES ('job_a', 'fit', 0, 2, '{}', '{}', 8);"
+                           "INSERT INTO idempotency_keys VALUES ('k', 'h', 'job_a', 8);"
+                           "INSERT INTO grooms (id, name, latest, created, changed) VALUES ('grm_a', 'g', 1, 9, 9);"
+                           "INSERT INTO revisions VALUES ('grm_a', 1, 0, 'g', '{}', 'fit', 9)", &diag));
+    sqlite3_close(db);
+    ck_ok(store_open(test_folder_path("groomd.db"), &store, &diag));
+    ck_ok(store_asset_get(store, "default", STORE_STRANDS, "str_a", &asset, &diag));
+    ck_assert_str_eq(asset.owner, "default");
+    ck_assert_str_eq(asset.name, "bob");
+    store_asset_finish(&asset);
+    ck_ok(store_project_of(store, "grm_a", project, &diag));
+    ck_assert_str_eq(project, "default");
+    ck_ok(store_job_get(store, "job_a", &job, &diag));
+    ck_assert_int_eq(job.queue_position, 0);
+    store_job_finish(&job);
+    ck_assert_str_eq(take(store, HASH_A).job_id, "job_a");
+    close_all(store);
+}
+END_TEST
+
 /* --- ids and times ---------------------------------------------------------------------- */
 
 START_TEST(ids_have_their_prefix_and_differ)
@@ -205,15 +237,15 @@ START_TEST(an_upload_comes_back_and_the_same_id_is_kept_once)
     struct store *store = open_new();
     struct store_asset asset = {.kind = STORE_STRANDS, .sha256 = HASH_A, .n_bytes = 12, .format = (char *)"hair",
                                 .unit_m = 0.01, .up = 'z', .name = (char *)"bob", .metadata = (char *)"{\"strands\":3}"};
-    store_asset_id(STORE_STRANDS, HASH_A, "hair", 0.01, 'z', asset.id);
+    store_asset_id(NULL, STORE_STRANDS, HASH_A, "hair", 0.01, 'z', asset.id);
     bool created = false;
-    ck_ok(store_asset_put(store, &asset, &created, &diag));
+    ck_ok(store_asset_put(store, &asset, 0, &created, &diag));
     ck_assert(created);
-    ck_ok(store_asset_put(store, &asset, &created, &diag));
+    ck_ok(store_asset_put(store, &asset, 0, &created, &diag));
     ck_assert(!created);
     store = reopen(store);
     struct store_asset read;
-    ck_ok(store_asset_get(store, STORE_STRANDS, asset.id, &read, &diag));
+    ck_ok(store_asset_get(store, NULL, STORE_STRANDS, asset.id, &read, &diag));
     ck_assert_str_eq(read.sha256, HASH_A);
     ck_assert_str_eq(read.format, "hair");
     ck_assert_str_eq(read.name, "bob");
@@ -222,7 +254,7 @@ START_TEST(an_upload_comes_back_and_the_same_id_is_kept_once)
     ck_assert_int_eq(read.up, 'z');
     ck_assert_int_gt(read.created_ms, 0);
     store_asset_finish(&read);
-    ck_status(store_asset_get(store, STORE_HEAD, asset.id, &read, &diag), GROOM_ENOTFOUND);
+    ck_status(store_asset_get(store, NULL, STORE_HEAD, asset.id, &read, &diag), GROOM_ENOTFOUND);
     bool referenced = false;
     ck_ok(store_blob_referenced(store, HASH_A, &referenced, &diag));
     ck_assert(referenced);
@@ -235,16 +267,16 @@ END_TEST
 START_TEST(the_id_of_an_upload_depends_on_bytes_and_options)
 {
     char a[STORE_ID_SIZE], b[STORE_ID_SIZE];
-    store_asset_id(STORE_STRANDS, HASH_A, "hair", 0.01, 'z', a);
-    store_asset_id(STORE_STRANDS, HASH_A, "hair", 0.01, 'z', b);
+    store_asset_id(NULL, STORE_STRANDS, HASH_A, "hair", 0.01, 'z', a);
+    store_asset_id(NULL, STORE_STRANDS, HASH_A, "hair", 0.01, 'z', b);
     ck_assert_str_eq(a, b);
-    store_asset_id(STORE_STRANDS, HASH_A, "hair", 0.01, 'y', b);
+    store_asset_id(NULL, STORE_STRANDS, HASH_A, "hair", 0.01, 'y', b);
     ck_assert_str_ne(a, b);
-    store_asset_id(STORE_STRANDS, HASH_A, "hair", 1, 'z', b);
+    store_asset_id(NULL, STORE_STRANDS, HASH_A, "hair", 1, 'z', b);
     ck_assert_str_ne(a, b);
-    store_asset_id(STORE_STRANDS, HASH_B, "hair", 0.01, 'z', b);
+    store_asset_id(NULL, STORE_STRANDS, HASH_B, "hair", 0.01, 'z', b);
     ck_assert_str_ne(a, b);
-    store_asset_id(STORE_HEAD, HASH_A, "hair", 0.01, 'z', b);
+    store_asset_id(NULL, STORE_HEAD, HASH_A, "hair", 0.01, 'z', b);
     ck_assert_str_ne(a + 4, b + 5);
 }
 END_TEST
@@ -255,13 +287,13 @@ START_TEST(pages_walk_a_list_from_new_to_old)
     for (int i = 0; i < 7; i++) {
         struct store_asset asset = {.kind = STORE_HEAD, .sha256 = HASH_A, .unit_m = 1, .up = 'y'};
         snprintf(asset.id, sizeof asset.id, "head_%d", i);
-        ck_ok(store_asset_put(store, &asset, NULL, &diag));
+        ck_ok(store_asset_put(store, &asset, 0, NULL, &diag));
     }
     struct store_page page = {.limit = 3};
     int expected = 6, n_pages = 0;
     do {
         struct store_asset_list list;
-        ck_ok(store_assets_list(store, STORE_HEAD, page, &list, &diag));
+        ck_ok(store_assets_list(store, NULL, STORE_HEAD, page, &list, &diag));
         for (size_t i = 0; i < list.n; i++)
             ck_assert_int_eq(list.items[i].id[5] - '0', expected--);
         page.before = list.next;
@@ -362,7 +394,7 @@ START_TEST(grooms_and_revisions_are_listed)
         ck_ok(store_revision_add(store, &revision, i, &diag));
     revision.groom_id = "grm_two";
     ck_ok(store_groom_create(store, &revision, &diag));
-    ck_ok(store_grooms_list(store, (struct store_page){0}, &grooms, &diag));
+    ck_ok(store_grooms_list(store, NULL, (struct store_page){0}, &grooms, &diag));
     ck_assert_uint_eq(grooms.n, 2);
     ck_assert_str_eq(grooms.items[0].id, "grm_two");
     ck_assert_uint_eq(grooms.items[1].latest, 5);
@@ -408,26 +440,208 @@ START_TEST(jobs_are_taken_by_priority_then_age)
 }
 END_TEST
 
-START_TEST(an_idempotency_key_stands_for_one_request)
+/* What the HTTP side says of the request that this thread is at. */
+static void act_with_key(const char *key, const char *hash, int64_t lifetime_ms)
+{
+    struct actor actor = {.request = "abc", .token = "tok_a", .name = "ann", .project = "film",
+                          .key = key, .key_hash = hash, .key_lifetime_ms = lifetime_ms};
+    actor_set(&actor);
+}
+
+START_TEST(an_idempotency_key_stands_for_what_it_made)
 {
     struct store *store = open_new();
-    struct store_job_new job = {.id = "job_a", .kind = "fit", .request = "{}", .options = "{}",
-                                .idempotency_key = "k", .request_hash = HASH_A};
-    char id[STORE_ID_SIZE];
-    bool created = false;
-    ck_ok(store_job_create(store, &job, id, &created, &diag));
-    ck_assert(created);
+    struct store_job_new job = {.id = "job_a", .kind = "fit", .request = "{}", .options = "{}", .project = "film"};
+    struct store_key found;
+    ck_status(store_key_find(store, "film", "k", HASH_A, &found, &diag), GROOM_ENOTFOUND);
+    act_with_key("k", HASH_A, 60000);
+    ck_ok(store_job_create(store, &job, &diag));
     job.id = "job_b";
+    ck_status(store_job_create(store, &job, &diag), GROOM_ECONFLICT); /* came at the same moment */
+    actor_set(NULL);
     store = reopen(store);
-    ck_ok(store_job_create(store, &job, id, &created, &diag));
-    ck_assert(!created);
-    ck_assert_str_eq(id, "job_a");
-    job.request_hash = HASH_B;
-    ck_status(store_job_create(store, &job, id, &created, &diag), GROOM_ECONFLICT);
-    struct store_job_list list;
-    ck_ok(store_jobs_list(store, NULL, (struct store_page){0}, &list, &diag));
+    ck_ok(store_key_find(store, "film", "k", HASH_A, &found, &diag));
+    ck_assert_str_eq(found.subject, "job_a");
+    ck_status(store_key_find(store, "film", "k", HASH_B, &found, &diag), GROOM_ECONFLICT);
+    ck_status(store_key_find(store, "other", "k", HASH_A, &found, &diag), GROOM_ENOTFOUND);
+    close_all(store);
+}
+END_TEST
+
+START_TEST(an_idempotency_key_expires)
+{
+    struct store *store = open_new();
+    struct store_key found;
+    act_with_key("k", HASH_A, -1);
+    ck_ok(store_groom_create(store, &first_revision, &diag));
+    ck_status(store_key_find(store, NULL, "k", HASH_A, &found, &diag), GROOM_ENOTFOUND);
+    act_with_key("k", HASH_B, 60000);
+    ck_ok(store_revision_add(store, &first_revision, 1, &diag));
+    actor_set(NULL);
+    ck_ok(store_key_find(store, "default", "k", HASH_B, &found, &diag));
+    ck_assert_str_eq(found.subject, first_revision.groom_id);
+    ck_assert_uint_eq(found.number, 2);
+    close_all(store);
+}
+END_TEST
+
+/* --- projects, turns, the audit --------------------------------------------------------------------- */
+
+START_TEST(projects_share_bytes_and_nothing_else)
+{
+    struct store *store = open_new();
+    struct store_asset film = {.kind = STORE_STRANDS, .project = "film", .sha256 = HASH_A, .n_bytes = 10, .unit_m = 1,
+                               .up = 'y'}, game = film, read;
+    char id[STORE_ID_SIZE], project[STORE_PROJECT_SIZE];
+    bool created = false;
+    snprintf(game.project, sizeof game.project, "game");
+    store_asset_id("film", STORE_STRANDS, HASH_A, "", 1, 'y', film.id);
+    store_asset_id("game", STORE_STRANDS, HASH_A, "", 1, 'y', game.id);
+    store_asset_id("default", STORE_STRANDS, HASH_A, "", 1, 'y', id);
+    ck_assert_str_ne(film.id, game.id);
+    ck_assert_str_ne(film.id, id);
+    ck_ok(store_asset_put(store, &film, 0, &created, &diag));
+    ck_ok(store_asset_put(store, &game, 0, &created, &diag));
+    ck_assert(created);
+    ck_ok(store_asset_get(store, "film", STORE_STRANDS, film.id, &read, &diag));
+    store_asset_finish(&read);
+    ck_status(store_asset_get(store, "film", STORE_STRANDS, game.id, &read, &diag), GROOM_ENOTFOUND);
+    ck_ok(store_project_of(store, game.id, project, &diag));
+    ck_assert_str_eq(project, "game");
+    ck_status(store_project_of(store, "str_none", project, &diag), GROOM_ENOTFOUND);
+    struct store_asset_list list;
+    ck_ok(store_assets_list(store, "game", STORE_STRANDS, (struct store_page){0}, &list, &diag));
     ck_assert_uint_eq(list.n, 1);
+    ck_assert_str_eq(list.items[0].id, game.id);
+    store_asset_list_finish(&list);
+    close_all(store);
+}
+END_TEST
+
+START_TEST(an_owner_has_so_many_bytes_and_no_more)
+{
+    struct store *store = open_new();
+    struct store_asset asset = {.id = "str_a", .project = "film", .owner = "tok_a", .sha256 = HASH_A, .n_bytes = 60,
+                                .unit_m = 1, .up = 'y'};
+    bool created = false;
+    struct store_usage usage;
+    ck_ok(store_asset_put(store, &asset, 100, &created, &diag));
+    snprintf(asset.id, sizeof asset.id, "str_b");
+    ck_status(store_asset_put(store, &asset, 100, &created, &diag), GROOM_ELIMIT);
+    snprintf(asset.id, sizeof asset.id, "str_a"); /* it is there: nothing is added */
+    ck_ok(store_asset_put(store, &asset, 1, &created, &diag));
+    snprintf(asset.id, sizeof asset.id, "str_b");
+    snprintf(asset.owner, sizeof asset.owner, "tok_b");
+    ck_ok(store_asset_put(store, &asset, 100, &created, &diag));
+    ck_ok(store_usage_of(store, "tok_a", &usage, &diag));
+    ck_assert_uint_eq(usage.n_bytes, 60);
+    close_all(store);
+}
+END_TEST
+
+static void queue(struct store *store, const char *id, const char *owner, int32_t priority)
+{
+    struct store_job_new job = {.id = id, .kind = "fit", .request = "{}", .options = "{}", .owner = owner,
+                                .priority = priority};
+    ck_ok(store_job_create(store, &job, &diag));
+}
+
+/* Whoever queues many at once gets one turn in two; positions say in which order they are taken. */
+START_TEST(owners_take_turns_and_positions_say_so)
+{
+    struct store *store = open_new();
+    static const char *const order[] = {"job_urgent", "job_a1", "job_b1", "job_c1", "job_a2", "job_b2", "job_a3"};
+    queue(store, "job_a1", "ann", 0);
+    queue(store, "job_a2", "ann", 0);
+    queue(store, "job_a3", "ann", 0);
+    queue(store, "job_b1", "bob", 0);
+    queue(store, "job_b2", "bob", 0);
+    queue(store, "job_c1", "cat", 0);
+    queue(store, "job_urgent", "dan", 1);
+    struct store_job_list list;
+    ck_ok(store_jobs_list(store, NULL, NULL, (struct store_page){0}, &list, &diag));
+    for (size_t i = 0; i < list.n; i++)
+        ck_assert_str_eq(order[list.items[i].queue_position], list.items[i].id);
     store_job_list_finish(&list);
+    for (size_t i = 0; i < sizeof order / sizeof order[0]; i++) {
+        struct store_job job;
+        char token[8];
+        ck_ok(store_job_get(store, order[i], &job, &diag));
+        ck_assert_int_eq(job.queue_position, 0);
+        store_job_finish(&job);
+        snprintf(token, sizeof token, "t%zu", i);
+        ck_assert_str_eq(take(store, token).job_id, order[i]);
+    }
+    close_all(store);
+}
+END_TEST
+
+/* Turns count what was taken, also where nothing runs any more: three of ann's came and went. */
+START_TEST(a_turn_is_remembered_after_its_job)
+{
+    struct store *store = open_new();
+    queue(store, "job_a1", "ann", 0);
+    ck_ok(move(store, take(store, "1").job_id, STORE_JOB_RUNNING, STORE_JOB_SUCCEEDED, 1, STORE_ATTEMPT_SUCCEEDED));
+    queue(store, "job_a2", "ann", 0);
+    queue(store, "job_b1", "bob", 0);
+    ck_assert_str_eq(take(store, "2").job_id, "job_b1");
+    ck_assert_str_eq(take(store, "3").job_id, "job_a2");
+    close_all(store);
+}
+END_TEST
+
+START_TEST(a_full_queue_takes_no_more)
+{
+    struct store *store = open_new();
+    struct store_job_new job = {.id = "job_c", .kind = "fit", .request = "{}", .options = "{}", .owner = "ann",
+                                .max_queued = 3, .max_queued_of_owner = 2};
+    queue(store, "job_a", "ann", 0);
+    queue(store, "job_b", "ann", 0);
+    ck_status(store_job_create(store, &job, &diag), GROOM_ELIMIT);
+    job.owner = "bob";
+    ck_ok(store_job_create(store, &job, &diag));
+    job.id = "job_d";
+    ck_status(store_job_create(store, &job, &diag), GROOM_ELIMIT);
+    ck_assert_ptr_nonnull(strstr(diag.detail, "queue is full"));
+    take(store, HASH_A); /* what runs does not wait */
+    ck_ok(store_job_create(store, &job, &diag));
+    close_all(store);
+}
+END_TEST
+
+START_TEST(every_change_is_in_the_audit_and_stays_there)
+{
+    struct store *store = open_new();
+    struct store_audit_list list;
+    struct connection *c;
+    act_with_key(NULL, NULL, 0);
+    make_job(store, "job_a", 0);
+    ck_ok(store_groom_create(store, &first_revision, &diag));
+    ck_status(store_groom_create(store, &first_revision, &diag), GROOM_ECONFLICT); /* no change */
+    ck_ok(store_revision_add(store, &first_revision, 1, &diag));
+    actor_set(NULL);
+    ck_ok(move(store, "job_a", STORE_JOB_QUEUED, STORE_JOB_CANCELLED, 0, 0));
+    store = reopen(store);
+    ck_ok(store_audit_list(store, (struct store_page){0}, &list, &diag));
+    ck_assert_uint_eq(list.n, 4);
+    ck_assert_str_eq(list.items[0].action, "job.end");
+    ck_assert_str_eq(list.items[0].name, "groomd");
+    ck_assert_str_eq(list.items[1].action, "groom.revise");
+    ck_assert_str_eq(list.items[1].subject, first_revision.groom_id);
+    ck_assert_str_eq(list.items[2].action, "groom.create");
+    ck_assert_str_eq(list.items[3].action, "job.create");
+    ck_assert_str_eq(list.items[3].request, "abc");
+    ck_assert_str_eq(list.items[3].token, "tok_a");
+    ck_assert_str_eq(list.items[3].name, "ann");
+    store_audit_list_finish(&list);
+    ck_ok(store_audit_list(store, (struct store_page){.limit = 1, .before = 3}, &list, &diag));
+    ck_assert_str_eq(list.items[0].action, "groom.create");
+    ck_assert_int_eq(list.next, 2);
+    store_audit_list_finish(&list);
+    ck_ok(transaction_begin(store, &c, &diag));
+    ck_assert_int_ne(database_execute(c->db, "DELETE FROM audit", &diag), GROOM_OK);
+    ck_assert_int_ne(database_execute(c->db, "UPDATE audit SET name = 'eve'", &diag), GROOM_OK);
+    ck_ok(transaction_end(c, GROOM_OK, &diag));
     close_all(store);
 }
 END_TEST
@@ -774,10 +988,9 @@ static void make_jobs_and_say(int fd)
     if (store_open(test_folder_path("groomd.db"), &store, NULL) != GROOM_OK)
         _exit(1);
     for (;;) {
-        char id[STORE_ID_SIZE] = "", made[STORE_ID_SIZE];
-        bool created;
+        char id[STORE_ID_SIZE] = "";
         struct store_job_new job = {.id = id, .kind = "fit", .request = "{}", .options = "{}"};
-        if (store_make_id("job_", id) != GROOM_OK || store_job_create(store, &job, made, &created, NULL) != GROOM_OK ||
+        if (store_make_id("job_", id) != GROOM_OK || store_job_create(store, &job, NULL) != GROOM_OK ||
             write(fd, id, sizeof id) != (ssize_t)sizeof id)
             _exit(1);
     }
@@ -875,14 +1088,17 @@ START_TEST(a_full_database_says_so_and_goes_on)
 }
 END_TEST
 
-TEST_SUITE("store", a_look_waits_for_no_writer, readers_cannot_write_or_checkpoint, a_newer_schema_is_refused, what_is_not_a_database_is_refused, a_damaged_database_is_refused,
+TEST_SUITE("store", the_first_schema_becomes_the_present_one, a_look_waits_for_no_writer, readers_cannot_write_or_checkpoint, a_newer_schema_is_refused, what_is_not_a_database_is_refused, a_damaged_database_is_refused,
            two_daemons_do_not_share_a_database, a_step_that_fails_leaves_the_version_before_it,
            ids_have_their_prefix_and_differ, times_are_rfc_3339,
            an_upload_comes_back_and_the_same_id_is_kept_once, the_id_of_an_upload_depends_on_bytes_and_options,
            pages_walk_a_list_from_new_to_old, revisions_are_kept_and_follow_each_other,
            arrays_come_back_byte_for_byte, a_revision_with_an_unknown_array_leaves_nothing,
            grooms_and_revisions_are_listed, jobs_are_taken_by_priority_then_age,
-           an_idempotency_key_stands_for_one_request, only_the_drawn_transitions_are_allowed,
+           an_idempotency_key_stands_for_what_it_made, an_idempotency_key_expires,
+           projects_share_bytes_and_nothing_else, an_owner_has_so_many_bytes_and_no_more,
+           owners_take_turns_and_positions_say_so, a_turn_is_remembered_after_its_job, a_full_queue_takes_no_more,
+           every_change_is_in_the_audit_and_stays_there, only_the_drawn_transitions_are_allowed,
            success_and_its_groom_are_one_transaction,
            a_job_that_is_to_be_cancelled_neither_succeeds_nor_queues_again, a_stale_attempt_is_fenced_off, a_stale_run_of_an_attempt_is_fenced_off,
            a_back_off_holds_a_job_back, a_checkpoint_replaces_the_one_before_and_goes_with_the_job,

@@ -50,7 +50,7 @@ static void close_uploads(void)
 static void begin(uint64_t n_bytes)
 {
     struct store_upload upload;
-    ck_ok(uploads_begin(uploads, n_bytes, "filename YQ==", &upload, &diag));
+    ck_ok(uploads_begin(uploads, NULL, NULL, n_bytes, "filename YQ==", &upload, &diag));
     memcpy(id, upload.id, sizeof id);
     store_upload_finish(&upload);
 }

@@ -27,6 +27,7 @@ extern "C" {
     X(GROOM_ECANCELLED, "cancelled",         409, "the work was cancelled")                        \
     X(GROOM_ENOTFOUND,  "not-found",         404, "no such thing")                                 \
     X(GROOM_ECONFLICT,  "conflict",          409, "it was changed meanwhile")                      \
+    X(GROOM_ELIMIT,     "limit-reached",     429, "a limit is reached for now")                     \
     X(GROOM_EINTERNAL,  "internal",          500, "a library below failed in a way it should not")
 
 typedef enum groom_status {
