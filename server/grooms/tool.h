@@ -13,7 +13,8 @@ struct tool_arguments {
 void tool_arguments_init(struct tool_arguments *arguments, const struct grooms *grooms, const char *command);
 void tool_add(struct tool_arguments *arguments, const char *name, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-/* --head and its frame. A head that is not here (the groom came from elsewhere) is left out. */
+/* --head and its frame. A head that is not here (the groom came from elsewhere), or not in the project of
+ * what is shown (of_id), is left out. */
 void tool_add_head(struct tool_arguments *arguments, struct grooms *grooms, const char *of_id, const char *head_id);
 
 /* The strands of a revision as a HAIR file without a name, in metres, read from its start. */
