@@ -468,6 +468,7 @@ static void run_check(struct task *task)
 {
     struct request *request = (struct request *)task;
     int flags = request->route->flags;
+    json_memory_begin(); /* a thread serves many: what failed for another is not ours */
     if (flags & ROUTE_WORK)
         check_attempt(request);
     else if (access_needs_owner(request))
