@@ -12,7 +12,7 @@
 #include "server/launch/spawn.h"
 
 /* A fit takes all the processor it gets, for long; whoever waits for an answer comes first. */
-#define ATTEMPT_NICE 10
+#define ATTEMPT_NICE 5
 
 /* --- handles: "local:PID:START:BOOT" ------------------------------------------------------ */
 

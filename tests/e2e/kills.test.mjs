@@ -31,10 +31,10 @@ async function killOne(daemon, next, counts) {
   await daemon.start();
 }
 
-test(`${n_kills} kills lose nothing`, { timeout: (60000 + n_kills * 4000) * slowness }, async (t) => {
+test(`${n_kills} kills lose nothing`, { timeout: (300000 + n_kills * 4000) * slowness }, async (t) => {
   const daemon = await startDaemon(t, { args: ['--workers', '2', '--worker-threads', '1', '--job-attempts', '100', '--log-level', 'error'] });
   const workload = new Workload(daemon, seed), next = random(seed), counts = { daemons: 0, workers: 0 };
-  workload.start(4, 40 + n_kills / 2);
+  workload.start(4, 3 + n_kills / 4);
   while (counts.daemons + counts.workers < n_kills) {
     // after a few answers, and then in the midst of something; now and then at once
     const wanted = workload.n_told + Math.floor(6 * next()), late = Date.now() + 4000;
@@ -43,7 +43,7 @@ test(`${n_kills} kills lose nothing`, { timeout: (60000 + n_kills * 4000) * slow
     await killOne(daemon, next, counts);
   }
   await workload.stop();
-  await workload.drain((60000 + n_kills * 1000) * slowness);
+  await workload.drain((240000 + n_kills * 1000) * slowness);
   const found = await workload.examine();
   t.diagnostic(`killed the daemon ${counts.daemons} times and workers ${counts.workers} times; ${JSON.stringify(found)}`);
   assert.ok(found.uploads > 0 && found.jobs > 0 && found.revisions > 0, JSON.stringify(found));

@@ -73,10 +73,10 @@ export class Daemon {
     let output = '';
     child.stdout.setEncoding('utf8').on('data', (text) => { output += text; });
     this.url = await until(`groomd says where it listens; its log:\n${this.log()}`, () => {
-      if (child.exitCode !== null) throw new Error(`groomd ended with ${child.exitCode}:\n${this.log()}`);
+      if (child.exitCode !== null || child.signalCode !== null) throw new Error(`groomd ended with ${child.exitCode ?? child.signalCode}:\n${this.log()}`);
       return /^listening on (\S+)\n/.exec(output)?.[1];
     });
-    await until('groomd is ready', async () => (await this.fetch('/readyz').catch(() => null))?.ok);
+    await until('groomd is ready', async () => child.signalCode !== null || (await this.fetch('/readyz').catch(() => null))?.ok);
     return this;
   }
 
