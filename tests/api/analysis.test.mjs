@@ -112,6 +112,17 @@ test('a groom is analysed revision by revision', async (t) => {
   await refused(daemon, 404, 'not-found', 'GET', `${at}/analysis?revision=9`);
 });
 
+test('a groom made of uploaded strands is analysed and clustered as well', async (t) => {
+  const daemon = await startDaemon(t);
+  const id = await upload(daemon, [coil(0), coil(0.1), coil(0.2), straight(0.3)]);
+  const groom = (await expect(daemon, 201, 'POST', `/v1/strands/${id}/ruffle`, { body: { rho: 0.2, match_elements: 4, seed: 3 } })).json.groom;
+  const analysis = (await expect(daemon, 200, 'GET', `/v1/grooms/${groom}/analysis?arrays=vertices`)).json;
+  assert.deepEqual([...decode(analysis.vertices.first)], [0, 161, 322, 483, 523]);
+  assert.ok(analysis.share.coiled > 0.5);
+  const clusters = (await expect(daemon, 200, 'GET', `/v1/grooms/${groom}/clusters?count=4`)).json;
+  assert.deepEqual(clusters.clusters.map(({ strands }) => strands), [1, 1, 1, 1]);
+});
+
 test('clusters come with frames to draw and to move', async (t) => {
   const daemon = await startDaemon(t);
   const places = [0, 0.2, 0.4];
