@@ -10,6 +10,7 @@
 #include <openssl/evp.h>
 
 #include "proto/json_text.h"
+#include "proto/problem.h"
 #include "server/jobs/queue.h"
 
 /* --- tokens ---------------------------------------------------------------------------- */
@@ -234,20 +235,26 @@ groom_status work_result(struct jobs *jobs, const struct store_attempt_ref *ref,
     return jobs_move(jobs, &move, diag);
 }
 
-/* A problem object, printed anew: what is kept is JSON whatever was sent. */
+/* A name as problems have it: "/problems/out-of-memory". */
+static bool is_problem_name(const char *name)
+{
+    return name[0] && !name[strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789-")];
+}
+
+/* A problem object, printed anew: what is kept, and shown as the job's error, is a problem whatever was sent. */
 static groom_status read_problem(const char *body, size_t n_body, char **text, struct groom_diag *diag)
 {
-    cJSON *problem = json_text_parse(body, n_body, NULL);
-    bool good = cJSON_IsObject(problem) &&
-                cJSON_IsString(cJSON_GetObjectItemCaseSensitive(problem, "type")) &&
-                cJSON_IsString(cJSON_GetObjectItemCaseSensitive(problem, "detail"));
-    char *printed = good ? cJSON_PrintUnformatted(problem) : NULL;
-    cJSON_Delete(problem);
+    struct problem problem;
+    cJSON *json = cJSON_ParseWithLength(body, n_body);
+    bool good = json && problem_from_json(json, &problem) && is_problem_name(problem.name) && problem.detail[0];
+    cJSON_Delete(json);
     if (!good)
-        return groom_fail(diag, GROOM_EINVAL, "a failure is a problem object with the strings type and detail");
-    if (!printed)
+        return groom_fail(diag, GROOM_EINVAL,
+                          "a failure is a problem object with a type (/problems/ and a-z, 0-9, -) and a detail");
+    if (!problem.title[0])
+        snprintf(problem.title, sizeof problem.title, "the job failed");
+    if (!(*text = problem_print(&problem)))
         return groom_fail(diag, GROOM_ENOMEM, "no memory for a problem");
-    *text = printed;
     return GROOM_OK;
 }
 

@@ -45,19 +45,24 @@ const curl = (secure, args, options) => run('curl', ['--silent', '--insecure', '
 test('nginx in front: TLS, HTTP/2, a large upload, an event stream as it comes', { skip: !has('nginx') && 'nginx is not installed' }, async (t) => {
   const daemon = await startIdleDaemon(t, { args: ['--hosts', 'grooms.example.org'] });
   const { secure, plain } = await startNginx(t, daemon), at = `https://grooms.example.org:${secure}`;
+  // what a proxy passes on comes from elsewhere: without tokens it is refused
+  assert.match((await curl(secure, [`${at}/v1/jobs`])).stdout, /groomd token create/);
+  const made = await run(join(build, 'groomd'), ['token', 'create', '--data', daemon.data, '--name', 'nginx', '--scopes', 'read,submit,admin']);
+  daemon.token = made.stdout.trim();
+  const auth = ['--header', `Authorization: Bearer ${daemon.token}`];
 
   const health = await curl(secure, ['--http2', '--write-out', '%{http_version} %{http_code}', `${at}/healthz`]);
   assert.equal(health.stdout, '{"status":"ok"}2 200', health.stderr);
   const moved = await run('curl', ['--silent', '--output', '/dev/null', '--write-out', '%{http_code} %{redirect_url}', '--header', 'Host: grooms.example.org', `http://127.0.0.1:${plain}/v1/jobs?limit=2`]);
   assert.equal(moved.stdout, '301 https://grooms.example.org/v1/jobs?limit=2');
   for (const [path, status] of [['/v1/work/job', '404'], ['/metrics', '200']])
-    assert.equal((await curl(secure, ['--output', '/dev/null', '--write-out', '%{http_code}', at + path])).stdout, status, path);
+    assert.equal((await curl(secure, [...auth, '--output', '/dev/null', '--write-out', '%{http_code}', at + path])).stdout, status, path);
 
   await t.test('an upload of 72 MB goes through and is stored once', async () => {
     const folder = temporaryFolder(t), file = join(folder, 'large.hair');
     writeFileSync(file, straightHair(60000, 100));
     for (const version of ['--http2', '--http1.1']) {
-      const sent = await curl(secure, [version, '--data-binary', `@${file}`, '--header', 'Content-Type: application/octet-stream', `${at}/v1/strands`]);
+      const sent = await curl(secure, [...auth, version, '--data-binary', `@${file}`, '--header', 'Content-Type: application/octet-stream', `${at}/v1/strands`]);
       assert.equal(JSON.parse(sent.stdout).vertices, 6000000, sent.stdout + sent.stderr);
     }
   });
@@ -65,7 +70,7 @@ test('nginx in front: TLS, HTTP/2, a large upload, an event stream as it comes',
   await t.test('events arrive one by one', async () => {
     const job = await submit(daemon), token = await daemon.attempt();
     let text = '';
-    const watch = curl(secure, ['--http2', '--no-buffer', `${at}/v1/jobs/${job.id}/events`], { on_start: (child) => child.stdout.on('data', (piece) => { text += piece; }) });
+    const watch = curl(secure, [...auth, '--http2', '--no-buffer', `${at}/v1/jobs/${job.id}/events`], { on_start: (child) => child.stdout.on('data', (piece) => { text += piece; }) });
     await until('the first event is there', () => /"state":"running"/.test(text));
     for (const progress of [0.25, 0.5]) {
       await call(daemon, 'POST', '/v1/work/progress', { token, body: { progress } });

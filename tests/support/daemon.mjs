@@ -83,7 +83,8 @@ export class Daemon {
   log() { return existsSync(this.log_path) ? readFileSync(this.log_path, 'utf8') : ''; }
 
   fetch(path, options = {}) {
-    return fetch(new URL(path, this.url), { signal: AbortSignal.timeout(60000 * slowness), ...options });
+    const headers = this.token ? { Authorization: `Bearer ${this.token}`, ...options.headers } : options.headers;
+    return fetch(new URL(path, this.url), { signal: AbortSignal.timeout(60000 * slowness), ...options, headers });
   }
 
   async json(path, options) { return (await this.fetch(path, options)).json(); }

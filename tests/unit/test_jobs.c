@@ -407,7 +407,7 @@ START_TEST(a_job_that_cannot_be_done_fails_at_once_with_its_problem)
 {
     begin();
     char id[STORE_ID_SIZE], token[WORK_TOKEN_SIZE];
-    const char *problem = "{\"type\":\"degenerate\",\"detail\":\"no strands are left\"}";
+    const char *problem = "{\"type\":\"/problems/degenerate\",\"title\":\"bald\",\"status\":422,\"detail\":\"no strands are left\"}";
     submit(id);
     struct store_attempt_ref ref = take(token);
     ck_status(work_failed(jobs, &ref, "{}", 2, &diag), GROOM_EINVAL);
