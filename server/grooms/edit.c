@@ -120,6 +120,8 @@ static groom_status apply_json_patch(const cJSON *document, const cJSON *patch, 
         return GROOM_OK;
     case JSON_PATCH_NO_MEMORY:
         return groom_fail(diag, GROOM_ENOMEM, "no memory to apply the patch");
+    case JSON_PATCH_TEST: /* the state is not what the patch is for (RFC 5789, 2.2) */
+        return groom_fail_field(diag, GROOM_ECONFLICT, error.pointer, "%s", error.detail);
     default:
         return groom_fail_field(diag, GROOM_EINVAL, error.pointer, "%s", error.detail);
     }

@@ -121,7 +121,7 @@ test('bad patches are refused at the culprit and change nothing', async (t) => {
   await bad([{ op: 'replace', path: '/operators/1/radius', value: -1 }], { pointer: '/operators/1/radius' });
   await bad([{ op: 'replace', path: '/operators/1/radius', value: 'x' }], { pointer: '/operators/1/radius' });
   await bad([{ op: 'replace', path: '/operators/9/radius', value: 1 }], { pointer: '/0/path' });
-  await bad([{ op: 'test', path: '/name', value: 'another' }], { pointer: '/0/value' });
+  await refused(daemon, 409, 'conflict', 'PATCH', groom.at, { headers: { ...json_patch, 'If-Match': '"1"' }, body: [{ op: 'test', path: '/name', value: 'another' }], problem: { pointer: '/0/value' } });
   await bad([{ op: 'spin', path: '/name' }], { pointer: '/0/op' });
   await bad([{ op: 'replace', path: '/id', value: 'grm_mine' }], { pointer: '/id' });
   await bad({ op: 'add' });
