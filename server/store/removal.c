@@ -10,10 +10,12 @@ static groom_status run_for(struct connection *c, const char *sql, const char *i
     return query_run(&q, NULL);
 }
 
-/* Reports that compare it with something, or something with it. */
+/* Reports that compare it with something, or something with it; but a groom keeps what it measured against
+ * strands that are gone since. */
 static groom_status delete_qualities(struct connection *c, const char *id, struct groom_diag *diag)
 {
-    return run_for(c, "DELETE FROM qualities WHERE subject = ?1 OR target = ?1 OR target LIKE ?1 || '/%'", id, diag);
+    return run_for(c, "DELETE FROM qualities WHERE subject = ?1 OR target LIKE ?1 || '/%'"
+                      " OR (target = ?1 AND subject NOT LIKE 'grm%')", id, diag);
 }
 
 /* --- uploads ------------------------------------------------------------------------------ */
