@@ -224,13 +224,15 @@ START_TEST(a_patch_that_is_late_or_wrong_changes_nothing)
         {"[{\"op\":\"add\",\"path\":\"/operators/9\",\"value\":{\"type\":\"frizz\"}}]", NULL},
         {"[{\"op\":\"replace\",\"path\":\"/strands\",\"value\":1}]", "/strands/roots"},
         {"[{\"op\":\"replace\",\"path\":\"/strands/roots/$array\",\"value\":\"00\"}]", "/strands/roots"},
-        {"[{\"op\":\"test\",\"path\":\"/name\",\"value\":\"not this\"}]", NULL},
         {"[{\"op\":\"replace\",\"path\":\"\",\"value\":[]}]", NULL},
         {"{}", NULL},
         {"[", NULL},
     };
     set_up(&fixture);
     ck_status(patch(&fixture, 2, "[]", &diag), GROOM_ECONFLICT);
+    ck_assert_str_eq(diag.pointer, "");
+    ck_status(patch(&fixture, 1, "[{\"op\":\"test\",\"path\":\"/name\",\"value\":\"not this\"}]", &diag), GROOM_ECONFLICT);
+    ck_assert_str_eq(diag.pointer, "/0/value");
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         groom_status status = patch(&fixture, 1, bad[i].text, &diag);
         ck_assert_msg(status == GROOM_EINVAL, "%s: %s", bad[i].text, groom_status_name(status));
