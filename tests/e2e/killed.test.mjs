@@ -10,7 +10,7 @@ import { groomctl, slowness, startDaemon, until } from '../support/daemon.mjs';
 
 const options = { timeout: 240000 * slowness };
 // Large enough that every kill below finds the job in its middle.
-const size = ['--strands', slowness > 1 ? '6000' : '40000'], guides = ['--guides', slowness > 1 ? '600' : '1500'];
+const size = ['--strands', slowness > 1 ? '6000' : '20000'], guides = ['--guides', slowness > 1 ? '600' : '1500'];
 let folder, undisturbed;
 
 async function json(daemon, args) {
