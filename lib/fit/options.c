@@ -54,7 +54,7 @@ const struct option_row options_table[] = {
     ROW(instance_weights, candidates, OPTION_U32, 12, 12, 12, 1, 32,
         "Guides near a strand among which it chooses the interpolation_guides that it blends."),
     ROW(instance_weights, distance_pull, OPTION_REAL_OR_AUTO, 0, 0, 0, 1e-9, 1e6,
-        "Pull towards the weights by distance, over what free weights leave of the usual strand. auto: 100 where the operators are named, 1 where they are not."),
+        "Pull towards the weights by distance, over what free weights leave of the usual strand. auto: 100 where the operators are named, 10 where they are not."),
     ROW(instance_weights, iterations, OPTION_U32, 2000, 2000, 2000, 0, 1000000,
         "Gradient steps of the paper's method; the closed form that is used needs none."),
     ROW(instance_weights, learning_rate, OPTION_REAL, 30, 30, 30, 0, 1e6,

@@ -17,7 +17,7 @@
 #define ALIKE 1.5              /* times as far from the strand as near guides are: surely like it, and */
 #define UNLIKE 3.0             /* surely not */
 #define PULL_NAMED 100.0       /* automatic pulls: operators named, */
-#define PULL_FREE 1.0          /* or left to the fit */
+#define PULL_FREE 10.0         /* not named: guides as near to the truth as with 100, real strands as well explained as with 1 */
 #define FREEDOMS 4.0           /* of what a strand does that neither weights nor ways explain */
 
 struct weighing {
