@@ -16,6 +16,8 @@
 #define DEFAULT_VERTICES 100
 #define DEFAULT_STRANDS 10000
 #define DEFAULT_PLACES 60000
+#define FEWEST_PLACES 2000
+#define CLOSEST_PLACES_M 0.25e-3 /* a quarter of the least tolerance */
 #define PIECE 256u /* strands */
 
 struct groom_quality_target {
@@ -280,8 +282,14 @@ static groom_status fill_options(const struct groom_quality_options *options, st
     *out = options ? *options : (struct groom_quality_options){0};
     out->vertices = out->vertices ? out->vertices : DEFAULT_VERTICES;
     out->strands = out->strands ? out->strands : DEFAULT_STRANDS;
-    out->places = out->places ? out->places : DEFAULT_PLACES;
     return out->vertices >= 4 ? GROOM_OK : groom_fail(diag, GROOM_EINVAL, "%u vertices a strand are too few: 4 are the least", out->vertices);
+}
+
+/* Places nearer to each other than that tell the same. */
+static uint32_t places_for(const struct quality_set *set)
+{
+    double n = quality_set_length(set) / CLOSEST_PLACES_M;
+    return n > DEFAULT_PLACES ? DEFAULT_PLACES : n < FEWEST_PLACES ? FEWEST_PLACES : (uint32_t)n;
 }
 
 groom_status groom_quality_target_create(const struct groom_strands *strands, const struct groom_mesh *head,
@@ -296,8 +304,10 @@ groom_status groom_quality_target_create(const struct groom_strands *strands, co
     target->allocator = allocator;
     if ((st = fill_options(options, &target->options, diag)) != GROOM_OK ||
         (st = quality_set_init(&target->set, strands, target->options.vertices, context, diag)) != GROOM_OK ||
-        (st = measure_floor(target, context, diag)) != GROOM_OK ||
-        (st = measure_floor_of_places(target, context, diag)) != GROOM_OK)
+        (st = measure_floor(target, context, diag)) != GROOM_OK)
+        goto out;
+    target->options.places = target->options.places ? target->options.places : places_for(&target->set);
+    if ((st = measure_floor_of_places(target, context, diag)) != GROOM_OK)
         goto out;
     if (head && ((st = groom_bvh_create(head, context, &target->head, diag)) != GROOM_OK ||
                  (st = quality_inside(&target->set, target->head, context, &target->inside, diag)) != GROOM_OK))
