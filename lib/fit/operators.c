@@ -366,20 +366,6 @@ static groom_status measure_losses(const struct groom_fit *fit, struct losses *l
     return st;
 }
 
-/* The value before the stage goes into both columns of the report; that after it into the second. */
-static void note_loss(struct groom_fit *fit, const char *name, double value, uint64_t iteration,
-                      const struct groom_context *context)
-{
-    struct groom_fit_report *report = &fit->report;
-    progress_loss(context, name, iteration, value);
-    for (uint32_t i = 0; i < report->n_losses; i++)
-        if (strcmp(report->losses[i].stage, "operators") == 0 && strcmp(report->losses[i].name, name) == 0) {
-            report->losses[i].after = value;
-            return;
-        }
-    report_loss(report, "operators", name, value, value);
-}
-
 static groom_status report_losses(struct groom_fit *fit, uint64_t iteration, const struct groom_context *context,
                                   struct groom_diag *diag)
 {
@@ -387,11 +373,11 @@ static groom_status report_losses(struct groom_fit *fit, uint64_t iteration, con
     groom_status st = measure_losses(fit, &losses, context, diag);
     if (st != GROOM_OK)
         return st;
-    note_loss(fit, "shape", losses.shape, iteration, context);
-    note_loss(fit, "spectra", losses.spectra, iteration, context);
-    note_loss(fit, "segments", losses.segments, iteration, context);
-    note_loss(fit, "scale", losses.scale, iteration, context);
-    note_loss(fit, "clump", losses.clump, iteration, context);
+    report_progress(&fit->report, "operators", "shape", losses.shape, iteration, context);
+    report_progress(&fit->report, "operators", "spectra", losses.spectra, iteration, context);
+    report_progress(&fit->report, "operators", "segments", losses.segments, iteration, context);
+    report_progress(&fit->report, "operators", "scale", losses.scale, iteration, context);
+    report_progress(&fit->report, "operators", "clump", losses.clump, iteration, context);
     return GROOM_OK;
 }
 
@@ -437,7 +423,7 @@ static groom_status search_step(struct groom_fit *fit, struct matching *matching
         (st = search_one(matching, &trial, fit->iteration, &square, context, diag)) != GROOM_OK)
         return st;
     trial_keep(&trial, fit);
-    note_loss(fit, "misfit", square, fit->iteration, context);
+    report_progress(&fit->report, "operators", "misfit", square, fit->iteration, context);
     if ((fit->iteration = next_searched(&trial, fit->iteration + 1)) == trial.n_unknowns) {
         fit->phase = REFINE;
         fit->iteration = 0;
@@ -453,7 +439,7 @@ static groom_status refine_step(struct groom_fit *fit, struct matching *matching
     groom_status st = refine(fit, matching, &square, &converged, context, diag);
     if (st != GROOM_OK)
         return st;
-    note_loss(fit, "misfit", square, count_unknowns(fit) + fit->iteration, context);
+    report_progress(&fit->report, "operators", "misfit", square, count_unknowns(fit) + fit->iteration, context);
     if (++fit->iteration >= fit->options.stages.operators.refinements || (converged && floor_of(fit) <= FLOOR_LAST)) {
         fit->phase = AFTER;
         fit->iteration = 0;

@@ -60,7 +60,7 @@ const struct option_row options_table[] = {
     ROW(instance_weights, learning_rate, OPTION_REAL, 30, 30, 30, 0, 1e6,
         "Learning rate of the paper's method; the closed form that is used needs none."),
 
-    {"/stages/guides", OPTION_GROUP, 0, ALL(0), 0, 0, "The shape of the guides (Section 5.4)."},
+    {"/stages/guides", OPTION_GROUP, 0, ALL(0), 0, 0, "The shape of the guides (Section 5.4). What belongs to the paper's method is taken and kept: the linear system that is solved needs none of it."},
     ROW(guides, cycles, OPTION_REAL, 3, 3, 3, 0.01, 1e3,
         "Waves along a guide that keep half of their size: shorter ones are left to the operators."),
     ROW(guides, across, OPTION_REAL_OR_AUTO, 3, 0, 0, 1e-6, 1e6,
@@ -78,7 +78,7 @@ const struct option_row options_table[] = {
     ROW(guides, sigma_phi, OPTION_REAL, 0.4, 0.4, 0.4, 1e-6, 1e3,
         "Width of the splat onto sphere directions of the paper's method."),
 
-    {"/stages/operators", OPTION_GROUP, 0, ALL(0), 0, 0, "The parameters of the operators (Section 5.5)."},
+    {"/stages/operators", OPTION_GROUP, 0, ALL(0), 0, 0, "The parameters of the operators (Section 5.5). Steps and learning rate of the paper's method are taken and kept; the refinement that is used needs neither."},
     ROW(operators, pairs, OPTION_U32, 500, 1500, 3000, 1, 100000,
         "Pairs of neighbouring strands of which statistics are matched."),
     ROW(operators, refinements, OPTION_U32, 7, 14, 30, 0, 1000,

@@ -306,20 +306,6 @@ out:
     return st;
 }
 
-/* The values before the stage go into both columns of the report; those after it into the second. */
-static void note_loss(struct groom_fit *fit, const char *name, double value, uint64_t iteration,
-                      const struct groom_context *context)
-{
-    struct groom_fit_report *report = &fit->report;
-    progress_loss(context, name, iteration, value);
-    for (uint32_t i = 0; i < report->n_losses; i++)
-        if (strcmp(report->losses[i].stage, "randoms") == 0 && strcmp(report->losses[i].name, name) == 0) {
-            report->losses[i].after = value;
-            return;
-        }
-    report_loss(report, "randoms", name, value, value);
-}
-
 static groom_status report_losses(struct groom_fit *fit, uint64_t iteration, const struct groom_context *context,
                                   struct groom_diag *diag)
 {
@@ -327,11 +313,11 @@ static groom_status report_losses(struct groom_fit *fit, uint64_t iteration, con
     groom_status st = measure(fit, &loss, context, diag);
     if (st != GROOM_OK)
         return st;
-    note_loss(fit, "L_rand", loss.total, iteration, context);
-    note_loss(fit, "spectra", loss.spectra, iteration, context);
-    note_loss(fit, "direction", loss.direction, iteration, context);
-    note_loss(fit, "length", loss.length, iteration, context);
-    note_loss(fit, "vertex", loss.vertex, iteration, context);
+    report_progress(&fit->report, "randoms", "L_rand", loss.total, iteration, context);
+    report_progress(&fit->report, "randoms", "spectra", loss.spectra, iteration, context);
+    report_progress(&fit->report, "randoms", "direction", loss.direction, iteration, context);
+    report_progress(&fit->report, "randoms", "length", loss.length, iteration, context);
+    report_progress(&fit->report, "randoms", "vertex", loss.vertex, iteration, context);
     return GROOM_OK;
 }
 

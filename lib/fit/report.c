@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/progress.h"
 #include "fit/state.h"
 
 void report_note(struct groom_fit_report *report, const char *format, ...)
@@ -25,6 +26,18 @@ void report_loss(struct groom_fit_report *report, const char *stage, const char 
     snprintf(loss->name, sizeof loss->name, "%s", name);
     loss->before = before;
     loss->after = after;
+}
+
+void report_progress(struct groom_fit_report *report, const char *stage, const char *name, double value,
+                     uint64_t iteration, const struct groom_context *context)
+{
+    progress_loss(context, name, iteration, value);
+    for (uint32_t i = 0; i < report->n_losses; i++)
+        if (strcmp(report->losses[i].stage, stage) == 0 && strcmp(report->losses[i].name, name) == 0) {
+            report->losses[i].after = value;
+            return;
+        }
+    report_loss(report, stage, name, value, value);
 }
 
 const struct groom_fit_report *groom_fit_get_report(const struct groom_fit *fit) { return &fit->report; }

@@ -93,5 +93,8 @@ groom_status target_create(struct groom_fit *fit, const struct groom_strands *st
 /* report.c */
 void report_note(struct groom_fit_report *report, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void report_loss(struct groom_fit_report *report, const char *stage, const char *name, double before, double after);
+/* A loss of a stage in progress, streamed: its first value stands in both columns, later ones in the second. */
+void report_progress(struct groom_fit_report *report, const char *stage, const char *name, double value,
+                     uint64_t iteration, const struct groom_context *context);
 
 #endif

@@ -11,7 +11,7 @@
 struct looking {
     const struct quality_set *set;
     const struct groom_bvh *head;
-    struct groom_quality_head *pieces; /* share: metres for now */
+    struct groom_quality_head *pieces; /* share: metres, until the pieces are added up */
 };
 
 static double between(const float *a, const float *b)

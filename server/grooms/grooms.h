@@ -117,7 +117,7 @@ struct grooms_layer_edit {
 enum grooms_edited_end {
     GROOMS_EDITED,  /* a revision was made */
     GROOMS_TRIED,   /* nothing was written */
-    GROOMS_TOO_MANY /* strands for now: nothing was done. Submit a job of this kind, inputs and options */
+    GROOMS_TOO_MANY /* strands for one request: nothing was done. Submit a job of this kind, inputs and options */
 };
 
 struct grooms_layer_edited {

@@ -293,7 +293,7 @@ groom_status trial_finish(struct trial *trial, trial_store store, void *user, st
     return status;
 }
 
-/* --- too many for now -------------------------------------------------------------------------------- */
+/* --- too many for one request -------------------------------------------------------------------------------- */
 
 /* What a job is to be given: the body as it came, and what it is for, at this revision. */
 static groom_status hand_over(struct trial *trial, struct grooms_layer_edited *edited)
