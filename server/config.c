@@ -76,6 +76,8 @@ static const struct option options[] = {
      "how long an Idempotency-Key is remembered; 0: for ever"},
     {"keep-jobs", "SECONDS", SECONDS, AT(keep_jobs_s), "0", 0, ANY / 2000,
      "finished jobs; what they made stays; 0: for ever"},
+    {"keep-preparations", "SECONDS", SECONDS, AT(keep_preparations_s), "2592000", 0, ANY / 2000,
+     "what a retargeting worked out of its strands, after the last job that asked for it; 0: for ever"},
     {"connections", "N", COUNT, AT(connections), "1200", 8, 100000, "open connections"},
     {"idle-timeout", "SECONDS", SECONDS, AT(idle_timeout_s), "60", 1, 3600, "close a connection after so long without a byte"},
     {"head-timeout", "SECONDS", SECONDS, AT(head_timeout_s), "20", 1, 3600, "time for the request line and headers"},

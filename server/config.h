@@ -35,7 +35,7 @@ struct config {
     uint64_t slurm_interval_s;
     uint64_t parse_time_s, parse_memory;
     uint64_t webhook_attempts, webhook_timeout_s;
-    uint64_t keep_events_s, keep_keys_s, keep_jobs_s;
+    uint64_t keep_events_s, keep_keys_s, keep_jobs_s, keep_preparations_s;
     uint64_t max_wait_s, shutdown_s;
     uint64_t log_level; /* enum config_log_level */
 };

@@ -263,7 +263,8 @@ static groom_status start_housekeeper(struct daemon *daemon, struct groom_diag *
     return housekeeper_start(&(struct housekeeper_options){.store = daemon->store,
                                                            .jobs = daemon->jobs,
                                                            .keep_events_s = config->keep_events_s,
-                                                           .keep_jobs_s = config->keep_jobs_s},
+                                                           .keep_jobs_s = config->keep_jobs_s,
+                                                           .keep_preparations_s = config->keep_preparations_s},
                              &daemon->housekeeper, diag);
 }
 

@@ -26,13 +26,15 @@ static groom_status retire(const struct housekeeper_options *options, struct gro
     int64_t now = store_now_ms();
     const struct store_retention retention = {.events_before_ms = before(now, options->keep_events_s),
                                               .keys_before_ms = now,
-                                              .jobs_before_ms = before(now, options->keep_jobs_s)};
+                                              .jobs_before_ms = before(now, options->keep_jobs_s),
+                                              .preparations_before_ms = before(now, options->keep_preparations_s)};
     struct store_retired retired = {0};
     groom_status status;
     do
         status = store_retire(options->store, &retention, BATCH, &retired, diag);
     while (status == GROOM_OK &&
-           (retired.n_jobs == BATCH || retired.n_event_streams == BATCH || retired.n_keys == BATCH));
+           (retired.n_jobs == BATCH || retired.n_event_streams == BATCH || retired.n_keys == BATCH ||
+            retired.n_preparations == BATCH));
     return status;
 }
 

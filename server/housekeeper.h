@@ -5,6 +5,7 @@
  *   --keep-events     the progress and loss events of a finished job's stream
  *   --keep-keys       idempotency keys, when they expire
  *   --keep-jobs       finished jobs altogether; 0, the default: for ever
+ *   --keep-preparations  what was worked out of strands for their next retargeting, since it was last used
  *   --upload-expiry   uploads in pieces that nobody used (server/uploads)
  *   at a job's end    its checkpoint */
 #ifndef SERVER_HOUSEKEEPER_H
@@ -21,8 +22,8 @@ struct store;
 struct housekeeper_options {
     struct store *store; /* borrowed, as are the jobs */
     struct jobs *jobs;
-    uint64_t keep_events_s, keep_jobs_s; /* 0: for ever */
-    uint32_t round_s;                                 /* 0: 300 */
+    uint64_t keep_events_s, keep_jobs_s, keep_preparations_s; /* 0: for ever */
+    uint32_t round_s;                                         /* 0: 300 */
 };
 
 GROOM_MUST_CHECK groom_status housekeeper_start(const struct housekeeper_options *options,

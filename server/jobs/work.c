@@ -220,7 +220,7 @@ groom_status work_edited(struct jobs *jobs, const struct store_attempt_ref *ref,
 {
     struct store_job_move move = {.job_id = ref->job_id, .from = STORE_JOB_RUNNING, .to = STORE_JOB_SUCCEEDED,
                                   .attempt = ref->number, .attempt_state = STORE_ATTEMPT_SUCCEEDED,
-                                  .result = result, .groom = groom, .groom_expected = expected};
+                                  .result = result, .grooms = groom, .n_grooms = 1, .groom_expected = expected};
     return jobs_move(jobs, &move, diag);
 }
 
@@ -231,7 +231,7 @@ groom_status work_result(struct jobs *jobs, const struct store_attempt_ref *ref,
     snprintf(result, sizeof result, "{\"groom\":\"%.31s\",\"revision\":1}", groom->groom_id);
     struct store_job_move move = {.job_id = ref->job_id, .from = STORE_JOB_RUNNING, .to = STORE_JOB_SUCCEEDED,
                                   .attempt = ref->number, .attempt_state = STORE_ATTEMPT_SUCCEEDED,
-                                  .result = result, .groom = groom};
+                                  .result = result, .grooms = groom, .n_grooms = 1};
     return jobs_move(jobs, &move, diag);
 }
 

@@ -60,8 +60,8 @@ static groom_status check_room(struct connection *c, const char *owner, uint64_t
     return status;
 }
 
-static groom_status insert_asset(struct connection *c, const struct store_asset *asset, const char *owner,
-                                 int64_t now, bool *created, struct groom_diag *diag)
+static groom_status insert_row(struct connection *c, const struct store_asset *asset, const char *owner, int64_t now,
+                               bool *created, struct groom_diag *diag)
 {
     char up[2] = {asset->up, 0};
     int64_t n_changed = 0;
@@ -87,23 +87,28 @@ static groom_status insert_asset(struct connection *c, const struct store_asset 
     return status;
 }
 
-groom_status store_asset_put(struct store *store, const struct store_asset *asset, uint64_t max_bytes, bool *created,
-                             struct groom_diag *diag)
+groom_status asset_insert(struct connection *c, const struct store_asset *asset, uint64_t max_bytes, int64_t now,
+                          bool *created, struct groom_diag *diag)
 {
     const char *project = project_or_default(asset->project), *owner = asset->owner[0] ? asset->owner : project;
     const char *action = asset->kind == STORE_STRANDS ? "strands.upload" : "head.upload";
+    groom_status status = insert_row(c, asset, owner, now, created, diag);
+    if (status == GROOM_OK && *created)
+        status = check_room(c, owner, asset->n_bytes, max_bytes, diag);
+    if (status == GROOM_OK && *created)
+        status = audit_append(c, project, action, asset->id, asset->name, now, diag);
+    return status;
+}
+
+groom_status store_asset_put(struct store *store, const struct store_asset *asset, uint64_t max_bytes, bool *created,
+                             struct groom_diag *diag)
+{
     bool inserted = false;
-    int64_t now = store_now_ms();
     struct connection *c;
     groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    status = insert_asset(c, asset, owner, now, &inserted, diag);
-    if (status == GROOM_OK && inserted)
-        status = check_room(c, owner, asset->n_bytes, max_bytes, diag);
-    if (status == GROOM_OK && inserted)
-        status = audit_append(c, project, action, asset->id, asset->name, now, diag);
-    status = transaction_end(c, status, diag);
+    status = transaction_end(c, asset_insert(c, asset, max_bytes, store_now_ms(), &inserted, diag), diag);
     if (status == GROOM_OK && created)
         *created = inserted;
     return status;

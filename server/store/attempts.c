@@ -16,8 +16,7 @@ const char *store_attempt_state_name(enum store_attempt_state state)
 
 /* --- the fence ------------------------------------------------------------------------- */
 
-/* An attempt may speak while it is running and is its job's last one. */
-static groom_status pass_fence(struct connection *c, const struct store_attempt_ref *ref, bool *cancel,
+groom_status attempt_may_speak(struct connection *c, const struct store_attempt_ref *ref, bool *cancel,
                                struct groom_diag *diag)
 {
     struct query q = query_open(c,
@@ -52,7 +51,7 @@ groom_status store_attempt_find(struct store *store, const char *token_hash, uin
     if (status == GROOM_OK && found.number == 0)
         status = groom_fail(diag, GROOM_ENOTFOUND, "this token belongs to no attempt");
     if (status == GROOM_OK)
-        status = pass_fence(c, &found, NULL, diag);
+        status = attempt_may_speak(c, &found, NULL, diag);
     read_end(c);
     if (status == GROOM_OK)
         *ref = found;
@@ -81,7 +80,7 @@ static groom_status update_fenced(struct store *store, const struct store_attemp
     groom_status status = transaction_begin(store, &c, diag);
     if (status != GROOM_OK)
         return status;
-    if ((status = pass_fence(c, ref, NULL, diag)) == GROOM_OK) {
+    if ((status = attempt_may_speak(c, ref, NULL, diag)) == GROOM_OK) {
         struct query q = query_open(c, sql, diag);
         query_text(&q, 1, ref->job_id);
         query_integer(&q, 2, ref->number);
@@ -148,7 +147,7 @@ static groom_status write_progress(struct connection *c, const struct store_atte
                                    const struct store_progress *progress, bool *cancel, struct groom_diag *diag)
 {
     int64_t now = store_now_ms();
-    groom_status status = pass_fence(c, ref, cancel, diag);
+    groom_status status = attempt_may_speak(c, ref, cancel, diag);
     if (status == GROOM_OK)
         status = update_progress(c, ref, progress, diag);
     for (size_t i = 0; status == GROOM_OK && i < progress->n_losses; i++)
@@ -199,7 +198,7 @@ static groom_status write_checkpoint(struct connection *c, const struct store_at
                                      struct groom_diag *diag)
 {
     bool found;
-    groom_status status = pass_fence(c, ref, NULL, diag);
+    groom_status status = attempt_may_speak(c, ref, NULL, diag);
     if (status == GROOM_OK)
         status = read_checkpoint(c, ref->job_id, before, &found, diag);
     if (status == GROOM_OK && strcmp(before->sha256, checkpoint->sha256) != 0)

@@ -118,6 +118,7 @@ static groom_status name_blobs(const struct check *check)
     struct query q = query_open(check->c,
                                 "SELECT sha256, n_bytes, id FROM assets UNION ALL"
                                 " SELECT sha256, n_bytes, 'the checkpoint of ' || job_id FROM checkpoints UNION ALL"
+                                " SELECT sha256, n_bytes, 'the preparation of ' || subject FROM preparations UNION ALL"
                                 " SELECT sha256, n_bytes, id FROM uploads WHERE sha256 <> '' ORDER BY 1", check->diag);
     while (query_row(&q)) {
         query_copy(&q, 0, sha256, sizeof sha256);

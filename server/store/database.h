@@ -124,6 +124,13 @@ groom_status groom_add_revision(struct connection *c, const struct store_revisio
                                 uint32_t expected_latest, struct groom_diag *diag);
 groom_status groom_insert(struct connection *c, const struct store_revision_new *revision, const char *project,
                           int64_t now, struct groom_diag *diag);
+/* While it is running and is its job's last one; *cancel (or NULL): the job is to be cancelled.
+ * returns  GROOM_ECONFLICT (fenced) */
+groom_status attempt_may_speak(struct connection *c, const struct store_attempt_ref *ref, bool *cancel,
+                               struct groom_diag *diag);
+/* As store_asset_put. */
+groom_status asset_insert(struct connection *c, const struct store_asset *asset, uint64_t max_bytes, int64_t now,
+                          bool *created, struct groom_diag *diag);
 groom_status quality_insert(struct connection *c, const struct store_quality *key, const char *report, int64_t now,
                             struct groom_diag *diag);
 groom_status event_append(struct connection *c, const char *job_id, const char *type, const char *data,

@@ -45,6 +45,7 @@ groom_status store_blob_referenced(struct store *store, const char *sha256, bool
     struct connection *c = read_begin(store);
     struct query q = query_open(c, "SELECT 1 FROM assets WHERE sha256 = ?1 UNION ALL"
                                        " SELECT 1 FROM checkpoints WHERE sha256 = ?1 UNION ALL"
+                                       " SELECT 1 FROM preparations WHERE sha256 = ?1 UNION ALL"
                                        " SELECT 1 FROM uploads WHERE sha256 = ?1 LIMIT 1", diag);
     query_text(&q, 1, sha256);
     found = query_row(&q);

@@ -201,6 +201,20 @@ static groom_status drop_checkpoint(struct connection *c, const char *job_id, ch
     return query_run(&q, NULL);
 }
 
+static groom_status write_made(struct connection *c, const struct store_job_move *move, const struct present *present,
+                               int64_t now, struct groom_diag *diag)
+{
+    groom_status status = GROOM_OK;
+    bool created;
+    for (size_t i = 0; status == GROOM_OK && i < move->n_assets; i++)
+        status = asset_insert(c, &move->assets[i], 0, now, &created, diag);
+    if (status == GROOM_OK && move->groom_expected)
+        return groom_add_revision(c, move->grooms, move->groom_expected, diag);
+    for (size_t i = 0; status == GROOM_OK && i < move->n_grooms; i++)
+        status = groom_insert(c, &move->grooms[i], present->project, now, diag);
+    return status;
+}
+
 static groom_status write_move(struct connection *c, const struct store_job_move *move,
                                char garbage[STORE_HASH_SIZE], struct groom_diag *diag)
 {
@@ -211,9 +225,8 @@ static groom_status write_move(struct connection *c, const struct store_job_move
         status = check_move(move, &present, diag);
     if (status == GROOM_OK && move->attempt != 0)
         status = end_attempt(c, move, now, diag);
-    if (status == GROOM_OK && move->groom)
-        status = move->groom_expected ? groom_add_revision(c, move->groom, move->groom_expected, diag)
-                                      : groom_insert(c, move->groom, present.project, now, diag);
+    if (status == GROOM_OK)
+        status = write_made(c, move, &present, now, diag);
     if (status == GROOM_OK)
         status = update_job(c, move, now, diag);
     if (status == GROOM_OK)

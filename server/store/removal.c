@@ -18,6 +18,11 @@ static groom_status delete_qualities(struct connection *c, const char *id, struc
                       " OR (target = ?1 AND subject NOT LIKE 'grm%')", id, diag);
 }
 
+static groom_status delete_preparations(struct connection *c, const char *id, struct groom_diag *diag)
+{
+    return run_for(c, "DELETE FROM preparations WHERE subject = ?1", id, diag);
+}
+
 /* --- uploads ------------------------------------------------------------------------------ */
 
 /* Jobs that have not ended read their inputs again with each attempt. */
@@ -26,7 +31,7 @@ static groom_status check_unused(struct connection *c, const char *id, struct gr
     char job[STORE_ID_SIZE] = "";
     struct query q = query_open(c,
                                 "SELECT id FROM jobs WHERE state < 2 AND EXISTS"
-                                " (SELECT 1 FROM json_each(jobs.request) WHERE atom = ?1) LIMIT 1", diag);
+                                " (SELECT 1 FROM json_tree(jobs.request) WHERE atom = ?1) LIMIT 1", diag);
     query_text(&q, 1, id);
     if (query_row(&q))
         query_copy(&q, 0, job, sizeof job);
@@ -70,6 +75,8 @@ groom_status store_asset_remove(struct store *store, enum store_asset_kind kind,
         status = check_unused(c, id, diag);
     if (status == GROOM_OK)
         status = delete_qualities(c, id, diag);
+    if (status == GROOM_OK)
+        status = delete_preparations(c, id, diag);
     if ((status = transaction_end(c, status, diag)) == GROOM_OK)
         memcpy(garbage, sha256, STORE_HASH_SIZE);
     return status;
@@ -115,6 +122,8 @@ static groom_status delete_groom(struct connection *c, const char *id, struct gr
         status = run_for(c, "DELETE FROM revisions WHERE groom_id = ?1", id, diag);
     if (status == GROOM_OK)
         status = delete_qualities(c, id, diag);
+    if (status == GROOM_OK)
+        status = delete_preparations(c, id, diag);
     return status == GROOM_OK ? delete_groom_row(c, id, diag) : status;
 }
 

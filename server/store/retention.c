@@ -40,6 +40,20 @@ static groom_status retire_keys(struct connection *c, int64_t before, uint32_t m
     return status;
 }
 
+static groom_status retire_preparations(struct connection *c, int64_t before, uint32_t max_rows, uint64_t *n,
+                                        struct groom_diag *diag)
+{
+    int64_t n_changed = 0;
+    struct query q = query_open(c,
+                                "DELETE FROM preparations WHERE key IN"
+                                " (SELECT key FROM preparations WHERE used < ?1 LIMIT ?2)", diag);
+    query_integer(&q, 1, before);
+    query_integer(&q, 2, max_rows);
+    groom_status status = query_run(&q, &n_changed);
+    *n += (uint64_t)n_changed;
+    return status;
+}
+
 #define THOSE                                                                                                      \
     "(SELECT id FROM jobs WHERE state >= 2 AND finished < ?1 ORDER BY finished LIMIT ?2)"
 
@@ -79,6 +93,8 @@ groom_status store_retire(struct store *store, const struct store_retention *ret
         status = retire_events(c, retention->events_before_ms, max_rows, &done.n_event_streams, diag);
     if (status == GROOM_OK && retention->keys_before_ms > 0)
         status = retire_keys(c, retention->keys_before_ms, max_rows, &done.n_keys, diag);
+    if (status == GROOM_OK && retention->preparations_before_ms > 0)
+        status = retire_preparations(c, retention->preparations_before_ms, max_rows, &done.n_preparations, diag);
     if ((status = transaction_end(c, status, diag)) == GROOM_OK)
         *retired = done;
     return status;

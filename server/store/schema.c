@@ -134,7 +134,17 @@ static const char version_8[] =
     "CREATE TRIGGER audit_is_not_cut BEFORE DELETE ON audit"
     " BEGIN SELECT RAISE(ABORT, 'the audit is only added to'); END;";
 
-const char *const schema_steps[] = {version_1, version_2, version_3, version_4, version_5, version_6, version_7, version_8};
+/* what was worked out of strands alone, for the next job with the same */
+static const char version_9[] =
+    "CREATE TABLE preparations ("
+    "  key TEXT NOT NULL PRIMARY KEY, subject TEXT NOT NULL, sha256 TEXT NOT NULL, n_bytes INTEGER NOT NULL,"
+    "  used INTEGER NOT NULL) STRICT;"
+    "CREATE INDEX preparations_by_hash ON preparations (sha256);"
+    "CREATE INDEX preparations_by_subject ON preparations (subject);"
+    "CREATE INDEX preparations_by_use ON preparations (used);";
+
+const char *const schema_steps[] = {version_1, version_2, version_3, version_4, version_5,
+                                    version_6, version_7, version_8, version_9};
 const int schema_version = sizeof schema_steps / sizeof schema_steps[0];
 
 static groom_status read_version(sqlite3 *db, int *version, struct groom_diag *diag)

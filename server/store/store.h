@@ -280,7 +280,7 @@ struct store_job {
     enum store_job_state state;
     int32_t priority;       /* larger first; then owners in turn; then the older first */
     int64_t queue_position; /* jobs ahead of it; -1 where it is not queued */
-    char *request;          /* JSON object: {"strands":"str_…","head":"head_…"} */
+    char *request;          /* JSON object of inputs: {"strands":"str_…","head":"head_…"}; ids may stand deeper in it */
     char *options;          /* JSON object, defaults filled in */
     char *stage;            /* "" before the first */
     uint32_t stage_index, stage_count;
@@ -446,6 +446,26 @@ GROOM_MUST_CHECK groom_status store_attempt_checkpoint(struct store *store, cons
 GROOM_MUST_CHECK groom_status store_checkpoint_get(struct store *store, const char *job_id,
                                                    struct store_checkpoint *checkpoint, struct groom_diag *diag);
 
+/* --- preparations --------------------------------------------------------------------------------- */
+
+/* What an attempt has worked out of its inputs alone, for the next job with the same: a blob under a key that
+ * names all that it depends on. It goes with its subject, or once it was not asked for in a long time
+ * (store_retire); without it the work is done anew. */
+struct store_preparation {
+    char sha256[STORE_HASH_SIZE];
+    uint64_t n_bytes;
+};
+/* A committed, pinned blob. One of this key that is there already stays.
+ * subject  the strands or the groom that it was made of
+ * returns  GROOM_ECONFLICT (fenced) */
+GROOM_MUST_CHECK groom_status store_attempt_preparation(struct store *store, const struct store_attempt_ref *ref,
+                                                        const char *key, const char *subject,
+                                                        const struct store_preparation *preparation,
+                                                        struct groom_diag *diag);
+/* Notes that it was asked for. returns  GROOM_ENOTFOUND */
+GROOM_MUST_CHECK groom_status store_preparation_get(struct store *store, const char *key,
+                                                    struct store_preparation *preparation, struct groom_diag *diag);
+
 /* --- the one way from state to state -------------------------------------------------------------- */
 
 struct store_job_move {
@@ -456,11 +476,16 @@ struct store_job_move {
     const char *last_words;                 /* of it; NULL: "" */
     int64_t not_before_ms;                  /* back to queued: no earlier than this; 0: at once */
     const char *result, *error;             /* JSON objects for the end states, or NULL */
-    const struct store_revision_new *groom; /* created in the same transaction, or NULL */
-    uint32_t groom_expected;                /* 0: it is a new one; else the latest revision of the one that it follows */
+    /* What it has made, written in the same transaction: */
+    const struct store_revision_new *grooms; /* [n_grooms] */
+    size_t n_grooms;
+    uint32_t groom_expected;                /* 0: they are new; else there is one: the revision after this */
+    const struct store_asset *assets;       /* [n_assets] uploads that the grooms stand on; committed and pinned. One
+                                             * that is there already stays as it is */
+    size_t n_assets;
 };
 
-/* Move a job, end its attempt, write its groom and its `state` event: all or nothing. Into an end
+/* Move a job, end its attempt, write what it has made and its `state` event: all or nothing. Into an end
  * state, its checkpoint row goes; `garbage` is that blob ("" for none) for the caller to collect.
  * returns  GROOM_ECONFLICT (it is not in `from`, or `attempt` is not its running one),
  *          GROOM_ECANCELLED (to succeeded, but its cancellation was asked for),
@@ -617,9 +642,10 @@ struct store_retention {
     int64_t events_before_ms; /* progress and loss events; states, stages and losses stay */
     int64_t keys_before_ms;   /* idempotency keys that expire before that */
     int64_t jobs_before_ms;   /* jobs with all that is theirs; not the grooms that they made */
+    int64_t preparations_before_ms; /* preparations last asked for before that */
 };
 struct store_retired {
-    uint64_t n_event_streams, n_keys, n_jobs;
+    uint64_t n_event_streams, n_keys, n_jobs, n_preparations;
 };
 /* One transaction, at most max_rows of each kind: call again where so many went. */
 GROOM_MUST_CHECK groom_status store_retire(struct store *store, const struct store_retention *retention,

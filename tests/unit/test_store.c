@@ -691,7 +691,7 @@ START_TEST(success_and_its_groom_are_one_transaction)
     struct store_revision_new groom = first_revision;
     struct store_job_move success = {.job_id = "job_a", .from = STORE_JOB_RUNNING, .to = STORE_JOB_SUCCEEDED,
                                      .attempt = ref.number, .attempt_state = STORE_ATTEMPT_SUCCEEDED,
-                                     .result = "{\"groom\":\"grm_one\"}", .groom = &groom};
+                                     .result = "{\"groom\":\"grm_one\"}", .grooms = &groom, .n_grooms = 1};
     groom.arrays = &unknown;
     ck_status(store_job_move(store, &success, garbage, &diag), GROOM_EINVAL);
     ck_assert_int_eq(state_of(store, "job_a"), STORE_JOB_RUNNING);
@@ -708,6 +708,90 @@ START_TEST(success_and_its_groom_are_one_transaction)
     ck_assert_double_eq(job.progress, 1);
     ck_assert_int_gt(job.finished_ms, 0);
     store_job_finish(&job);
+    close_all(store);
+}
+END_TEST
+
+/* A retargeting makes a groom for each target, and the strands that it stands on. */
+START_TEST(success_may_bring_several_grooms_and_their_uploads)
+{
+    struct store *store = open_new();
+    struct store_asset row;
+    struct store_revision revision;
+    char garbage[STORE_HASH_SIZE];
+    make_job(store, "job_a", 0);
+    struct store_attempt_ref ref = take(store, HASH_A);
+    const struct store_asset assets[] = {
+        {.id = "str_new", .kind = STORE_STRANDS, .sha256 = HASH_B, .n_bytes = 7, .format = (char *)"hair", .unit_m = 1, .up = 'y'}};
+    struct store_revision_new grooms[] = {first_revision, {.groom_id = "grm_one", .name = "twin", .document = "{}"}};
+    const struct store_job_move success = {.job_id = "job_a", .from = STORE_JOB_RUNNING, .to = STORE_JOB_SUCCEEDED,
+                                           .attempt = ref.number, .attempt_state = STORE_ATTEMPT_SUCCEEDED,
+                                           .result = "{}", .grooms = grooms, .n_grooms = 2,
+                                           .assets = assets, .n_assets = 1};
+    ck_status(store_job_move(store, &success, garbage, &diag), GROOM_ECONFLICT); /* the second has the first's id */
+    ck_status(store_asset_get(store, NULL, STORE_STRANDS, "str_new", &row, &diag), GROOM_ENOTFOUND);
+    ck_status(store_revision_get(store, "grm_one", 0, &revision, &diag), GROOM_ENOTFOUND);
+    grooms[1].groom_id = "grm_two";
+    ck_ok(store_job_move(store, &success, garbage, &diag));
+    ck_ok(store_asset_get(store, "default", STORE_STRANDS, "str_new", &row, &diag));
+    ck_assert_str_eq(row.sha256, HASH_B);
+    store_asset_finish(&row);
+    ck_ok(store_revision_get(store, "grm_two", 0, &revision, &diag));
+    ck_assert_str_eq(revision.name, "twin");
+    store_revision_finish(&revision);
+    close_all(store);
+}
+END_TEST
+
+START_TEST(a_preparation_is_kept_under_its_key_and_goes_with_its_subject)
+{
+    struct store *store = open_new();
+    struct store_preparation found, made = {.sha256 = HASH_B, .n_bytes = 7}, other = {.sha256 = HASH_C, .n_bytes = 8};
+    const struct store_asset strands = {.id = "str_a", .kind = STORE_STRANDS, .sha256 = HASH_A, .n_bytes = 1,
+                                        .format = (char *)"hair", .unit_m = 1, .up = 'y'};
+    struct store_retired retired = {0};
+    char garbage[STORE_HASH_SIZE];
+    bool created, referenced;
+    ck_ok(store_asset_put(store, &strands, 0, &created, &diag));
+    make_job(store, "job_a", 0);
+    struct store_attempt_ref ref = take(store, HASH_A), stale = ref;
+    stale.number++;
+    ck_status(store_preparation_get(store, "k", &found, &diag), GROOM_ENOTFOUND);
+    ck_status(store_attempt_preparation(store, &stale, "k", "str_a", &made, &diag), GROOM_ECONFLICT);
+    ck_ok(store_attempt_preparation(store, &ref, "k", "str_a", &made, &diag));
+    ck_ok(store_attempt_preparation(store, &ref, "k", "str_a", &other, &diag)); /* the first stays */
+    ck_ok(store_preparation_get(store, "k", &found, &diag));
+    ck_assert_str_eq(found.sha256, HASH_B);
+    ck_assert_uint_eq(found.n_bytes, 7);
+    ck_ok(store_blob_referenced(store, HASH_B, &referenced, &diag));
+    ck_assert(referenced);
+    const struct store_retention recent = {.preparations_before_ms = store_now_ms() - 100000};
+    ck_ok(store_retire(store, &recent, 10, &retired, &diag));
+    ck_assert_uint_eq(retired.n_preparations, 0);
+    ck_ok(store_attempt_preparation(store, &ref, "l", "grm_b", &made, &diag));
+    ck_ok(move(store, "job_a", STORE_JOB_RUNNING, STORE_JOB_FAILED, 1, STORE_ATTEMPT_FAILED));
+    ck_ok(store_asset_remove(store, STORE_STRANDS, "str_a", garbage, &diag));
+    ck_status(store_preparation_get(store, "k", &found, &diag), GROOM_ENOTFOUND);
+    const struct store_retention all = {.preparations_before_ms = store_now_ms() + 1000};
+    ck_ok(store_retire(store, &all, 10, &retired, &diag));
+    ck_assert_uint_eq(retired.n_preparations, 1);
+    ck_status(store_preparation_get(store, "l", &found, &diag), GROOM_ENOTFOUND);
+    close_all(store);
+}
+END_TEST
+
+START_TEST(an_input_that_stands_deep_in_a_request_is_not_removed)
+{
+    struct store *store = open_new();
+    const struct store_asset head = {.id = "head_a", .kind = STORE_HEAD, .sha256 = HASH_A, .n_bytes = 1,
+                                     .format = (char *)"obj", .unit_m = 1, .up = 'y'};
+    const struct store_job_new job = {.id = "job_a", .kind = "retarget", .options = "{}",
+                                      .request = "{\"targets\":[{\"head\":\"head_a\"}]}"};
+    char garbage[STORE_HASH_SIZE];
+    bool created;
+    ck_ok(store_asset_put(store, &head, 0, &created, &diag));
+    ck_ok(store_job_create(store, &job, &diag));
+    ck_status(store_asset_remove(store, STORE_HEAD, "head_a", garbage, &diag), GROOM_ECONFLICT);
     close_all(store);
 }
 END_TEST
@@ -1100,6 +1184,8 @@ TEST_SUITE("store", the_first_schema_becomes_the_present_one, a_look_waits_for_n
            owners_take_turns_and_positions_say_so, a_turn_is_remembered_after_its_job, a_full_queue_takes_no_more,
            every_change_is_in_the_audit_and_stays_there, only_the_drawn_transitions_are_allowed,
            success_and_its_groom_are_one_transaction,
+           success_may_bring_several_grooms_and_their_uploads, a_preparation_is_kept_under_its_key_and_goes_with_its_subject,
+           an_input_that_stands_deep_in_a_request_is_not_removed,
            a_job_that_is_to_be_cancelled_neither_succeeds_nor_queues_again, a_stale_attempt_is_fenced_off, a_stale_run_of_an_attempt_is_fenced_off,
            a_back_off_holds_a_job_back, a_checkpoint_replaces_the_one_before_and_goes_with_the_job,
            events_are_numbered_without_gaps, a_loss_that_is_reported_again_is_kept_once,
