@@ -53,7 +53,7 @@ int uploads_check_patch(struct request *request);
 void uploads_call_patch(struct request *request);
 void uploads_call_delete(struct request *request);
 
-/* job_calls.c */
+/* job_calls.c, submission.c */
 /* Whose job it is, and how many more may wait; of a queue that is full the answer says when to come again. */
 void jobs_charge(struct request *request, struct jobs_request *submission);
 void jobs_respond(struct request *request, int status, const struct store_job *job);

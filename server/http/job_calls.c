@@ -1,142 +1,17 @@
-/* Jobs: submit, look, wait, cancel, events, losses. */
+/* Jobs: look, wait, cancel, events, losses; submission.c has how they are made. */
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "groom/fit.h"
 #include "server/http/events.h"
 #include "server/http/handlers.h"
 #include "server/http/server.h"
-#include "server/http/webhook_calls.h"
 #include "server/jobs/jobs.h"
 
-/* --- submit ----------------------------------------------------------------------------- */
+/* --- what all calls share ------------------------------------------------------------------ */
 
 #define QUEUE_RETRY_S 30 /* when to come again where a queue is full: fits take minutes */
-
-/* A submission, field by field. */
-struct submission {
-    char *inputs, *options; /* JSON, malloc'ed */
-    int32_t priority;
-    struct store_webhook_new webhook; /* its texts are the body's */
-    size_t n_webhooks;
-};
-
-static bool only_known(struct request *request, const cJSON *body)
-{
-    const cJSON *member;
-    char pointer[96];
-    cJSON_ArrayForEach(member, body)
-    {
-        if (router_knows("kind strands head options priority webhook", member->string))
-            continue;
-        snprintf(pointer, sizeof pointer, "/%.80s", member->string);
-        respond_bad_field(
-            request, 400, pointer,
-            "\"%.60s\" is not a member of a job; it takes kind, strands, head, options, priority "
-            "and webhook",
-            member->string);
-        return false;
-    }
-    return true;
-}
-
-/* Copies body's id of an upload into inputs, where that upload is there. */
-static bool take_input(struct request *request, const cJSON *body, cJSON *inputs, const char *key,
-                       enum store_asset_kind kind, bool needed)
-{
-    struct store_asset asset = {0};
-    struct groom_diag diag = {0};
-    char pointer[32];
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(body, key);
-    const char *id = cJSON_GetStringValue(item);
-    snprintf(pointer, sizeof pointer, "/%s", key);
-    if (!needed && (!item || cJSON_IsNull(item)))
-        return true;
-    if (!id) {
-        respond_bad_field(request, 400, pointer, "a job needs \"%s\", the id of an upload", key);
-        return false;
-    }
-    groom_status status = store_asset_get(request->service->store, request->actor.project, kind, id, &asset, &diag);
-    if (status == GROOM_ENOTFOUND)
-        respond_bad_field(request, 422, pointer, "there is no upload \"%.40s\"", id);
-    else if (status != GROOM_OK)
-        respond_failure(request, status, &diag);
-    else if (!cJSON_AddStringToObject(inputs, key, id))
-        respond_failure(request, status = GROOM_ENOMEM, NULL);
-    store_asset_finish(&asset);
-    return status == GROOM_OK;
-}
-
-static bool take_inputs(struct request *request, const cJSON *body, struct submission *submission)
-{
-    cJSON *inputs = cJSON_CreateObject();
-    bool fine = inputs && take_input(request, body, inputs, "strands", STORE_STRANDS, true) &&
-                take_input(request, body, inputs, "head", STORE_HEAD, false);
-    if (fine && !(submission->inputs = cJSON_PrintUnformatted(inputs))) {
-        respond_failure(request, GROOM_ENOMEM, NULL);
-        fine = false;
-    }
-    cJSON_Delete(inputs);
-    return fine;
-}
-
-/* Checked and with every default filled in, by the library that will read them. */
-static bool take_options(struct request *request, const cJSON *body, struct submission *submission)
-{
-    struct groom_fit_options *options = malloc(sizeof *options);
-    struct groom_diag diag = {0};
-    const cJSON *given = cJSON_GetObjectItemCaseSensitive(body, "options");
-    char *text = given && !cJSON_IsNull(given) ? cJSON_PrintUnformatted(given) : strdup("{}");
-    groom_status status =
-        options && text ? groom_fit_options_parse(text, strlen(text), options, &diag) : GROOM_ENOMEM;
-    if (status == GROOM_OK)
-        status = groom_fit_options_print(options, &submission->options, &diag);
-    free(options);
-    free(text);
-    if (status == GROOM_EINVAL) {
-        char pointer[sizeof diag.pointer + 8];
-        snprintf(pointer, sizeof pointer, "/options%s", diag.pointer);
-        respond_bad_field(request, 400, pointer, "%s", diag.detail);
-    } else if (status != GROOM_OK) {
-        respond_failure(request, status, &diag);
-    }
-    return status == GROOM_OK;
-}
-
-static bool take_priority(struct request *request, const cJSON *body, struct submission *submission)
-{
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(body, "priority");
-    if (!item)
-        return true;
-    double value = cJSON_IsNumber(item) ? item->valuedouble : 1e9;
-    if (value < -100 || value > 100 || value > (double)(int)value || value < (double)(int)value) {
-        respond_bad_field(request, 400, "/priority", "priority must be a whole number from -100 to 100");
-        return false;
-    }
-    if (value > 0 && !(request->scopes & ACCESS_ADMIN)) {
-        respond_bad_field(request, 403, "/priority",
-                          "a priority above 0 goes ahead of other people's jobs: that needs the scope admin");
-        return false;
-    }
-    submission->priority = (int32_t)value;
-    return true;
-}
-
-static bool take_body(struct request *request, const cJSON *body, struct submission *submission)
-{
-    const char *kind = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(body, "kind"));
-    if (!only_known(request, body))
-        return false;
-    if (!kind || strcmp(kind, "fit")) {
-        respond_bad_field(request, 400, "/kind", "kind must be \"fit\"");
-        return false;
-    }
-    return take_inputs(request, body, submission) && take_options(request, body, submission) &&
-           take_priority(request, body, submission) &&
-           webhook_take(request, body, &submission->webhook, &submission->n_webhooks);
-}
 
 void jobs_respond(struct request *request, int status, const struct store_job *job)
 {
@@ -151,36 +26,6 @@ void jobs_charge(struct request *request, struct jobs_request *submission)
     submission->max_queued = (uint32_t)request->service->config->max_queue;
     submission->max_queued_of_owner = (uint32_t)request->limits.queued;
     request->retry_after_s = QUEUE_RETRY_S;
-}
-
-static void submit(struct request *request, const struct submission *submission)
-{
-    struct store_job job = {0};
-    struct groom_diag diag = {0};
-    struct jobs_request wanted = {.kind = "fit",
-                                        .inputs = submission->inputs,
-                                        .options = submission->options,
-                                        .priority = submission->priority,
-                                        .webhook = submission->n_webhooks ? &submission->webhook : NULL};
-    jobs_charge(request, &wanted);
-    groom_status status = jobs_submit(request->service->jobs, &wanted, &job, &diag);
-    if (status != GROOM_OK) {
-        respond_failure(request, status, &diag);
-        return;
-    }
-    jobs_respond(request, 202, &job);
-    store_job_finish(&job);
-}
-
-void jobs_call_post(struct request *request)
-{
-    struct submission submission = {0};
-    cJSON *body = request_json(request);
-    if (body && take_body(request, body, &submission))
-        submit(request, &submission);
-    cJSON_Delete(body);
-    free(submission.inputs);
-    free(submission.options);
 }
 
 /* --- look -------------------------------------------------------------------------------- */
