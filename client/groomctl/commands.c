@@ -80,11 +80,30 @@ static const struct option_spec analyze_options[] = {
     {0},
 };
 
+#define CAMERA_OPTIONS                                                                                     \
+    {"size", 0, "N", "pixels of a side, or WIDTHxHEIGHT (512)"},                                            \
+    {"azimuth", 0, "DEG", "where the camera stands, degrees: 0 before the face, 90 at the person's left"}, \
+    {"elevation", 0, "DEG", "how high it stands, degrees: 90 looks down from above"},                       \
+    {"light", 0, "L", "camera: the lights go with the camera; front: they stand, as in the studio (camera)"}, \
+    {"revision", 0, "N", "the latest where not given"}
+
 static const struct option_spec preview_options[] = {
     {"output", 'o', "FILE", "where to, a PNG; - is standard output"},
-    {"view", 0, "V", "front, side, back or top"},
-    {"size", 0, "N", "pixels of a side"},
-    {"revision", 0, "N", "the latest where not given"},
+    {"view", 0, "V", "front, side, back or top, in place of a camera of your own"},
+    {"distance", 0, "M", "of the camera from what it looks at, metres (far enough for all of the hair)"},
+    {"target", 0, "X,Y,Z", "what it looks at, metres (the middle of the hair)"},
+    {"eye", 0, "X,Y,Z", "where it stands, metres, in place of azimuth, elevation and distance; needs --target"},
+    {"fov", 0, "DEG", "from the lower to the upper edge of the picture, degrees (20)"},
+    CAMERA_OPTIONS,
+    {0},
+};
+
+static const struct option_spec turntable_options[] = {
+    {"output", 'o', "FILE", "where to, an animated PNG; - is standard output"},
+    {"stills", 0, "FOLDER", "each frame as a PNG of its own there, frame_0000.png and so on, for an editor of films"},
+    {"frames", 0, "N", "of one turn (36)"},
+    {"seconds", 0, "S", "that one turn lasts (a tenth a frame)"},
+    CAMERA_OPTIONS,
     {0},
 };
 
@@ -180,7 +199,8 @@ const struct command groomctl_commands[] = {
     {"delete", "ID...", 1, MANY, NULL, "remove strands, heads or whole grooms; there is no way back", command_delete},
     {"export", "GROOM|STRANDS", 1, 1, export_options, "strands or guides into a file", command_export},
     {"analyze", "GROOM|STRANDS", 1, 1, analyze_options, "what kind of hair it is: curls, handedness, switchbacks", command_analyze},
-    {"preview", "GROOM", 1, 1, preview_options, "a shaded picture", command_preview},
+    {"preview", "GROOM", 1, 1, preview_options, "a shaded picture, from a view or a camera of your own", command_preview},
+    {"turntable", "GROOM", 1, 1, turntable_options, "a turn around it: an animated PNG, or its frames", command_turntable},
     {"compare", "GROOM|STRANDS|FILE [TARGET]", 1, 2, compare_options,
      "how alike strands are to a target; a groom's own is what it was fitted to; two files need no server", command_compare},
     {"set", "GROOM /POINTER=VALUE...", 2, MANY, edit_options, "change a groom: /operators/2/radius=0.01", command_set},

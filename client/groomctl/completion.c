@@ -16,6 +16,7 @@ static const struct choice {
     {"head-up", "y z"},
     {"quality", "draft standard high"},
     {"view", "front side back top"},
+    {"light", "camera front"},
     {"style", "straight wavy curly coily short spiky bent"},
     {"state", "queued running succeeded failed cancelled"},
     {"format", "hair usda ply obj data json tfx npy npz monohair ct2hair"},

@@ -1,4 +1,4 @@
-/* export, preview, and what else ends in a file. */
+/* export, and what else ends in a file. */
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
@@ -54,7 +54,7 @@ const char *format_of_path(const char *path)
     return NULL;
 }
 
-static int written(const struct groomctl *ctl, const char *path, int status)
+int download_said(const struct groomctl *ctl, const char *path, int status)
 {
     if (status != DONE || !strcmp(path, "-"))
         return status;
@@ -89,20 +89,5 @@ int command_export(struct groomctl *ctl, const struct arguments *arguments)
     url_query(&url, "up", argument(arguments, "up"));
     url_query(&url, "count", argument(arguments, "count"));
     url_query(&url, "revision", argument(arguments, "revision"));
-    return written(ctl, path, download_file(ctl, url.text, path));
-}
-
-int command_preview(struct groomctl *ctl, const struct arguments *arguments)
-{
-    const char *path = argument(arguments, "output");
-    struct url url;
-    if (!path)
-        return groomctl_usage_error("preview", "-o FILE.png is needed (\"-\" for standard output)");
-    url_init(&url, "/v1/grooms");
-    url_segment(&url, arguments->operands[0]);
-    url_segment(&url, "preview.png");
-    url_query(&url, "view", argument(arguments, "view"));
-    url_query(&url, "size", argument(arguments, "size"));
-    url_query(&url, "revision", argument(arguments, "revision"));
-    return written(ctl, path, download_file(ctl, url.text, path));
+    return download_said(ctl, path, download_file(ctl, url.text, path));
 }

@@ -50,6 +50,7 @@ int command_get(struct groomctl *ctl, const struct arguments *arguments);
 int command_export(struct groomctl *ctl, const struct arguments *arguments);
 int command_analyze(struct groomctl *ctl, const struct arguments *arguments);
 int command_preview(struct groomctl *ctl, const struct arguments *arguments);
+int command_turntable(struct groomctl *ctl, const struct arguments *arguments);
 int command_import(struct groomctl *ctl, const struct arguments *arguments);
 int command_set(struct groomctl *ctl, const struct arguments *arguments);
 int command_patch(struct groomctl *ctl, const struct arguments *arguments);

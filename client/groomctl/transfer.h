@@ -22,6 +22,8 @@ void upload_describe(const struct groomctl *ctl, enum sized_thing thing, const s
 
 /* The body of a GET into a file ("-": standard output). */
 int download_file(struct groomctl *ctl, const char *url_path, const char *path);
+/* After it: the file's name for people or, with --json, as an object. returns  status */
+int download_said(const struct groomctl *ctl, const char *path, int status);
 
 /* The format that a path's extension asks for, or NULL. */
 const char *format_of_path(const char *path);

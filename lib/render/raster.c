@@ -23,7 +23,7 @@ struct span {
 struct raster {
     const struct render_scene *scene;
     uint8_t *rgba;
-    int side;                   /* samples */
+    int columns;                /* samples */
     float widest;               /* hair, in samples, as drawn along an axis */
     struct span *chunks;        /* in order of the vertices, CHUNK_VERTICES each */
     struct sample *samples;     /* [threads][band_samples] */
@@ -33,13 +33,13 @@ struct raster {
 /* One band in the making: rows top .. bottom - 1 of samples. */
 struct band {
     const struct raster *raster;
-    int top, bottom, side;
+    int top, bottom, columns;
     struct sample *samples;
 };
 
 static struct sample *sample_at(const struct band *band, int x, int y)
 {
-    return &band->samples[(size_t)(y - band->top) * (size_t)band->side + (size_t)x];
+    return &band->samples[(size_t)(y - band->top) * (size_t)band->columns + (size_t)x];
 }
 
 static void put(struct band *band, int x, int y, float depth, uint32_t color)
@@ -69,7 +69,7 @@ static void draw_steep(struct band *band, const struct render_vertex *a, const s
     for (int y = first; y < end; y++) {
         float along = (float)y + 0.5f - a->y;
         int left = below(a->x + slope * along - 0.5f * (float)bar + 0.5f);
-        for (int x = at_least(left, 0); x < left + bar && x < band->side; x++)
+        for (int x = at_least(left, 0); x < left + bar && x < band->columns; x++)
             put(band, x, y, a->depth + fall * along, color);
     }
 }
@@ -78,7 +78,7 @@ static void draw_steep(struct band *band, const struct render_vertex *a, const s
 static void draw_flat(struct band *band, const struct render_vertex *a, const struct render_vertex *b, float width, uint32_t color)
 {
     float slope = (b->y - a->y) / (b->x - a->x), fall = (b->depth - a->depth) / (b->x - a->x);
-    int first = at_least(ceiling(a->x - 0.5f), 0), end = at_most(ceiling(b->x - 0.5f), band->side);
+    int first = at_least(ceiling(a->x - 0.5f), 0), end = at_most(ceiling(b->x - 0.5f), band->columns);
     int bar = at_least(1, (int)(width + 0.5f));
     for (int x = first; x < end; x++) {
         float along = (float)x + 0.5f - a->x;
@@ -181,10 +181,10 @@ static void draw_triangle(struct band *band, const struct render_vertex *const v
     high[0] = fmaxf(v[0]->x, fmaxf(v[1]->x, v[2]->x));
     low[1] = fminf(v[0]->y, fminf(v[1]->y, v[2]->y));
     high[1] = fmaxf(v[0]->y, fmaxf(v[1]->y, v[2]->y));
-    if (area == 0 || isnan(area) || high[1] < (float)band->top || low[1] > (float)band->bottom || high[0] < 0 || low[0] > (float)band->side)
+    if (area == 0 || isnan(area) || high[1] < (float)band->top || low[1] > (float)band->bottom || high[0] < 0 || low[0] > (float)band->columns)
         return;
     int top = at_least((int)fmaxf(low[1], 0), band->top), bottom = at_most((int)fminf(high[1], (float)band->bottom) + 1, band->bottom);
-    int left = (int)fmaxf(low[0], 0), right = at_most((int)fminf(high[0], (float)band->side) + 1, band->side);
+    int left = (int)fmaxf(low[0], 0), right = at_most((int)fminf(high[0], (float)band->columns) + 1, band->columns);
     for (int y = top; y < bottom; y++)
         for (int x = left; x < right; x++) {
             float cx = (float)x + 0.5f, cy = (float)y + 0.5f;
@@ -217,8 +217,8 @@ static uint8_t to_srgb(float linear)
 static uint32_t backdrop(const struct raster *raster, uint32_t x, uint32_t y)
 {
     static const float middle[3] = {0.60f, 0.62f, 0.65f}, outside[3] = {0.27f, 0.29f, 0.32f};
-    float size = (float)raster->scene->size, color[3];
-    float u = ((float)x + 0.5f) / size - 0.5f, v = ((float)y + 0.5f) / size - 0.45f;
+    float color[3];
+    float u = ((float)x + 0.5f) / (float)raster->scene->width_px - 0.5f, v = ((float)y + 0.5f) / (float)raster->scene->height_px - 0.45f;
     float t = fminf(1, 1.9f * (u * u + v * v));
     for (int k = 0; k < 3; k++)
         color[k] = middle[k] + (outside[k] - middle[k]) * t;
@@ -253,34 +253,34 @@ static void band_piece(void *user, uint32_t piece, uint32_t thread)
 {
     struct raster *raster = user;
     const struct render_scene *scene = raster->scene;
-    uint32_t top = piece * BAND_ROWS, bottom = top + BAND_ROWS < scene->size ? top + BAND_ROWS : scene->size;
+    uint32_t top = piece * BAND_ROWS, bottom = top + BAND_ROWS < scene->height_px ? top + BAND_ROWS : scene->height_px;
     struct band band = {.raster = raster, .top = (int)(top * scene->samples), .bottom = (int)(bottom * scene->samples),
-                        .side = raster->side, .samples = raster->samples + thread * raster->band_samples};
+                        .columns = raster->columns, .samples = raster->samples + thread * raster->band_samples};
     for (uint32_t y = top; y < bottom; y++)
-        for (uint32_t x = 0; x < scene->size; x++)
+        for (uint32_t x = 0; x < scene->width_px; x++)
             clear_pixel(&band, x, y);
     draw_skin(&band);
     draw_hair(&band);
     for (uint32_t y = top; y < bottom; y++)
-        for (uint32_t x = 0; x < scene->size; x++)
-            resolve_pixel(&band, x, y, raster->rgba + ((size_t)y * scene->size + x) * 4);
+        for (uint32_t x = 0; x < scene->width_px; x++)
+            resolve_pixel(&band, x, y, raster->rgba + ((size_t)y * scene->width_px + x) * 4);
 }
 
 groom_status render_raster(struct render_scene *scene, uint8_t *rgba, struct groom_diag *diag)
 {
-    struct raster raster = {.scene = scene, .rgba = rgba, .side = (int)(scene->size * scene->samples)};
+    struct raster raster = {.scene = scene, .rgba = rgba, .columns = (int)(scene->width_px * scene->samples)};
     uint32_t n = scene->strands->n_vertices, n_threads = parallel_threads(scene->context);
     size_t n_chunks = (size_t)chunk_of(n) + 1;
-    raster.band_samples = (size_t)raster.side * BAND_ROWS * scene->samples;
+    raster.band_samples = (size_t)raster.columns * BAND_ROWS * scene->samples;
     raster.chunks = memory_array(scene->allocator, n_chunks, sizeof *raster.chunks);
     raster.samples = memory_array(scene->allocator, raster.band_samples * n_threads, sizeof *raster.samples);
     raster.widest = 1.5f * width_in_samples(scene, scene->nearest);
     int ready = raster.chunks && raster.samples;
     if (ready) {
         parallel_for(scene->context, n / RENDER_PIECE + 1, span_piece, &raster);
-        parallel_for(scene->context, (scene->size + BAND_ROWS - 1) / BAND_ROWS, band_piece, &raster);
+        parallel_for(scene->context, (scene->height_px + BAND_ROWS - 1) / BAND_ROWS, band_piece, &raster);
     }
     memory_release(scene->allocator, raster.chunks, n_chunks, sizeof *raster.chunks);
     memory_release(scene->allocator, raster.samples, raster.band_samples * n_threads, sizeof *raster.samples);
-    return ready ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for a picture of %u pixels a side", scene->size);
+    return ready ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for a picture of %u x %u pixels", scene->width_px, scene->height_px);
 }

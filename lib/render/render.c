@@ -26,11 +26,14 @@ static groom_status check(const struct groom_strands *strands, const struct groo
 {
     if (options->size < GROOM_RENDER_MIN_SIZE || options->size > GROOM_RENDER_MAX_SIZE)
         return groom_fail(diag, GROOM_EINVAL, "the size is %u; it must be %d..%d pixels", options->size, GROOM_RENDER_MIN_SIZE, GROOM_RENDER_MAX_SIZE);
+    if (options->height && (options->height < GROOM_RENDER_MIN_SIZE || options->height > GROOM_RENDER_MAX_SIZE))
+        return groom_fail(diag, GROOM_EINVAL, "the height is %u; it must be %d..%d pixels", options->height, GROOM_RENDER_MIN_SIZE, GROOM_RENDER_MAX_SIZE);
     if ((unsigned)options->view >= GROOM_VIEW_COUNT)
         return groom_fail(diag, GROOM_EINVAL, "there is no view %d", (int)options->view);
     if (strands->n_strands == 0 || (options->framed_as && options->framed_as->n_strands == 0))
         return groom_fail(diag, GROOM_EEMPTY, "there is no strand to draw");
-    return head ? groom_mesh_validate(head, diag) : GROOM_OK;
+    groom_status st = options->camera ? render_camera_check(options->camera, diag) : GROOM_OK;
+    return st == GROOM_OK && head ? groom_mesh_validate(head, diag) : st;
 }
 
 groom_status groom_render_strands(const struct groom_strands *strands, const struct groom_mesh *head,
@@ -41,11 +44,13 @@ groom_status groom_render_strands(const struct groom_strands *strands, const str
     if (st != GROOM_OK)
         return st;
     const float *color = options->color;
-    struct render_scene scene = {.strands = strands, .framed = options->framed_as ? options->framed_as : strands, .head = head, .context = context, .allocator = memory_allocator(context),
-                                 .size = options->size, .samples = samples_for(options->size), .stride = stride_for(strands, options->size),
+    struct render_scene scene = {.strands = strands, .framed = options->framed_as ? options->framed_as : strands, .head = head,
+                                 .context = context, .allocator = memory_allocator(context),
+                                 .width_px = options->size, .height_px = options->height ? options->height : options->size,
+                                 .samples = samples_for(options->size), .stride = stride_for(strands, options->size),
                                  .width = options->width_m};
     memcpy(scene.color, color[0] > 0 || color[1] > 0 || color[2] > 0 ? color : brown, sizeof scene.color);
-    if ((st = render_frame(&scene, options->view, diag)) != GROOM_OK)
+    if ((st = render_frame(&scene, options, diag)) != GROOM_OK)
         return st;
     struct groom_light_options light = {LIGHT_CELLS, scene.stride, scene.width, {scene.key[0], scene.key[1], scene.key[2]}};
     st = groom_light_create(strands, &light, context, &scene.light, diag);

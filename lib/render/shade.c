@@ -92,18 +92,20 @@ static void add_light(const struct character *c, const float tangent[3], const f
 
 static uint32_t hair_color(const struct render_scene *scene, const struct character *c, const float *p, const float *q)
 {
-    float tangent[3], middle[3], key, ambient, color[3];
+    float tangent[3], middle[3], view[3], key, ambient, color[3];
     for (int k = 0; k < 3; k++) {
         tangent[k] = q[k] - p[k];
         middle[k] = 0.5f * (p[k] + q[k]);
+        view[k] = scene->eye[k] - middle[k];
     }
     normalize(tangent);
+    normalize(view);
     groom_light_at(scene->light, middle, &key, &ambient);
     float open = ambient * ambient;
     for (int k = 0; k < 3; k++)
         color[k] = sky[k] * c->color[k] * (0.06f + 0.94f * open);
-    add_light(c, tangent, scene->key, scene->view, key_light, 0.03f + 0.97f * key, color);
-    add_light(c, tangent, scene->rim, scene->view, rim_light, open * ambient, color);
+    add_light(c, tangent, scene->key, view, key_light, 0.03f + 0.97f * key, color);
+    add_light(c, tangent, scene->rim, view, rim_light, open * ambient, color);
     return color_pack(color);
 }
 
@@ -114,7 +116,7 @@ static void shade_strand(const struct render_scene *scene, uint32_t strand)
     for (uint32_t i = s->first[strand]; i < s->first[strand + 1]; i++) {
         const float *p = s->points[i], *q = i + 1 < s->first[strand + 1] ? s->points[i + 1] : p;
         project(scene, p, &scene->hair[i]);
-        if (scene->framed != scene->strands && scene->hair[i].depth < scene->nearest)
+        if (scene->culls && scene->hair[i].depth < scene->nearest)
             scene->hair[i].x = scene->hair[i].y = NAN;
         scene->hair[i].color = render_is_finite(p) && render_is_finite(q) ? hair_color(scene, &c, p, q) : 0;
     }

@@ -213,10 +213,24 @@ GROOM_MUST_CHECK groom_status grooms_quality_picture(struct grooms *grooms, cons
                                                      enum grooms_picture of, groom_view view, uint32_t size, char **png,
                                                      size_t *n_bytes, struct groom_diag *diag);
 
+/* How a groom is looked at. */
+struct grooms_shot {
+    const struct groom_render_camera *camera; /* borrowed; NULL: the view */
+    groom_view view;
+    uint32_t width, height; /* pixels */
+};
+
+/* A turn around a groom: the camera goes once around from its azimuth, in so many frames. */
+struct grooms_turntable {
+    uint32_t n_frames, frame_ms;
+    bool one_frame; /* a still of frame number `frame`, with the camera that it has in the turn */
+    uint32_t frame;
+};
+
 /* A shaded picture of the dense strands on the head that the groom was fitted with, as PNG bytes
- * (malloc'ed). */
+ * (malloc'ed). turntable: an animated PNG; NULL: a still. */
 GROOM_MUST_CHECK groom_status grooms_preview(struct grooms *grooms, const char *groom_id, uint32_t revision,
-                                             groom_view view, uint32_t size, char **png, size_t *n_bytes,
-                                             struct groom_diag *diag);
+                                             const struct grooms_shot *shot, const struct grooms_turntable *turntable,
+                                             char **png, size_t *n_bytes, struct groom_diag *diag);
 
 #endif

@@ -13,7 +13,7 @@
 #include "server/launch/child.h"
 
 #define WALL_MS 180000
-#define MAX_OUTPUT ((size_t)64 << 20)
+#define MAX_OUTPUT ((size_t)128 << 20)
 #define MEMORY ((uint64_t)8 << 30)
 
 /* --- command lines -------------------------------------------------------------------------- */

@@ -6,7 +6,7 @@
 
 /* A command line that owns its texts. */
 struct tool_arguments {
-    const char *argv[40];
+    const char *argv[48];
     size_t n, n_text;
     char text[16384];
 };

@@ -244,22 +244,6 @@ struct analysis_query {
     struct groom_analysis_options options;
 };
 
-static bool query_real(struct request *request, const char *name, double minimum, double maximum, double *value)
-{
-    const char *text = request_query(request, name);
-    char *end;
-    if (!text)
-        return true;
-    double number = strtod(text, &end);
-    if (end == text || *end || !(number >= minimum && number <= maximum)) {
-        respond_bad_query(request, name, "%s is \"%.40s\"; it must be a number from %g to %g", name, text, minimum,
-                          maximum);
-        return false;
-    }
-    *value = number;
-    return true;
-}
-
 static bool query_elements(struct request *request, uint32_t *n_elements)
 {
     uint64_t number = 0;
@@ -324,9 +308,9 @@ static bool read_query(struct request *request, struct analysis_query *q)
                                  .options = groom_analysis_options_default()};
     bool fine = request_query_number(request, "count", 1, UINT32_MAX, &count) &&
                 query_elements(request, &q->conversion.n_elements) &&
-                query_real(request, "tolerance", 1e-9, 1e3, &q->conversion.tolerance_m) &&
-                query_real(request, "straight_below", 0, 1e6, &q->options.straight_below) &&
-                query_real(request, "wavy_below", 0, 1, &q->options.wavy_below) &&
+                request_query_real(request, "tolerance", 1e-9, 1e3, &q->conversion.tolerance_m) &&
+                request_query_real(request, "straight_below", 0, 1e6, &q->options.straight_below) &&
+                request_query_real(request, "wavy_below", 0, 1, &q->options.wavy_below) &&
                 query_arrays(request, &q->parts) && query_format(request, &q->binary);
     q->count = (uint32_t)count;
     return fine;

@@ -78,7 +78,7 @@ static void respond_edit(struct request *request, groom_status status, uint32_t 
         respond_failure(request, status, diag);
 }
 
-static bool query_revision(struct request *request, uint32_t *revision)
+bool grooms_query_revision(struct request *request, uint32_t *revision)
 {
     uint64_t number = 0;
     bool fine = request_query_number(request, "revision", 1, UINT32_MAX, &number);
@@ -93,7 +93,7 @@ void grooms_call_get(struct request *request)
     uint32_t revision, number;
     bool arrays = true;
     struct groom_diag diag = {0};
-    if (!query_revision(request, &revision) || !request_query_bool(request, "arrays", &arrays))
+    if (!grooms_query_revision(request, &revision) || !request_query_bool(request, "arrays", &arrays))
         return;
     groom_status status = grooms_document(request->service->grooms, request->parameter[0], revision, arrays,
                                           &json, &n_bytes, &number, &diag);
@@ -249,7 +249,7 @@ typedef groom_status (*write_strands)(struct grooms *, const char *, const struc
                                       struct groom_sink, struct groom_diag *);
 
 /* The number of the revision that is meant: the latest where none is named. */
-static bool settle_revision(struct request *request, uint32_t *revision)
+bool grooms_settle_revision(struct request *request, uint32_t *revision)
 {
     struct store_revision found = {0};
     struct groom_diag diag = {0};
@@ -307,10 +307,10 @@ static void export(struct request *request, write_strands write, const char *suf
     struct grooms_export what = {.write = {.format = GROOM_FORMAT_HAIR, .frame = {.unit_m = 1}}};
     uint64_t count = 0, n_bytes = 0;
     char etag[80], name[80];
-    if (!query_revision(request, &what.revision) ||
+    if (!grooms_query_revision(request, &what.revision) ||
         !request_query_number(request, "count", 1, UINT32_MAX, &count) ||
         !tool_query_format(request, true, &what.write.format) ||
-        !tool_query_frame(request, &what.write.frame) || !settle_revision(request, &what.revision))
+        !tool_query_frame(request, &what.write.frame) || !grooms_settle_revision(request, &what.revision))
         return;
     what.count = (uint32_t)count;
     snprintf(etag, sizeof etag, "%u%s-%s-%u-%.9g-%s", what.revision, suffix,
@@ -391,35 +391,4 @@ void grooms_call_put_guides(struct request *request)
     if (convert_guides(request, converted))
         set_guides(request, converted, expected);
     close(converted);
-}
-
-void grooms_call_preview(struct request *request)
-{
-    groom_view view = GROOM_VIEW_FRONT;
-    uint32_t revision;
-    uint64_t size = 512;
-    char *png, etag[64];
-    size_t n_bytes;
-    struct groom_diag diag = {0};
-    const char *text = request_query(request, "view");
-    if (!query_revision(request, &revision) ||
-        !request_query_number(request, "size", GROOM_RENDER_MIN_SIZE, GROOM_RENDER_MAX_SIZE, &size))
-        return;
-    if (text && groom_view_parse(text, &view, &diag) != GROOM_OK) {
-        respond_bad_query(request, "view", "%s", diag.detail);
-        return;
-    }
-    if (!settle_revision(request, &revision))
-        return;
-    snprintf(etag, sizeof etag, "%u-%s-%u", revision, groom_view_name(view), (unsigned)size);
-    if (request_not_modified(request, etag))
-        return;
-    groom_status status = grooms_preview(request->service->grooms, request->parameter[0], revision, view,
-                                         (uint32_t)size, &png, &n_bytes, &diag);
-    if (status != GROOM_OK) {
-        respond_failure(request, status, &diag);
-        return;
-    }
-    respond_bytes(request, 200, "image/png", png, n_bytes);
-    respond_etag(request, "%s", etag);
 }

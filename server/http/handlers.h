@@ -97,7 +97,14 @@ void grooms_call_put_guides(struct request *request);
 void grooms_call_revisions(struct request *request);
 int grooms_check_edit(struct request *request);
 void grooms_call_revert(struct request *request);
-void grooms_call_preview(struct request *request);
+/* The revision of the query, 0 where none is named; and its number where that is the latest. return false where
+ * they refused (and answered) */
+bool grooms_query_revision(struct request *request, uint32_t *revision);
+bool grooms_settle_revision(struct request *request, uint32_t *revision);
+
+/* picture_calls.c */
+void pictures_call_preview(struct request *request);
+void pictures_call_turntable(struct request *request);
 
 /* layer_calls.c */
 void work_call_layer(struct request *request);

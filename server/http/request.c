@@ -54,6 +54,22 @@ bool request_query_number(struct request *request, const char *name, uint64_t mi
     return true;
 }
 
+bool request_query_real(struct request *request, const char *name, double minimum, double maximum, double *value)
+{
+    const char *text = request_query(request, name);
+    char *end;
+    if (!text)
+        return true;
+    double number = strtod(text, &end);
+    if (end == text || *end || !(number >= minimum && number <= maximum)) {
+        respond_bad_query(request, name, "%s is \"%.40s\"; it must be a number from %g to %g", name, text, minimum,
+                          maximum);
+        return false;
+    }
+    *value = number;
+    return true;
+}
+
 bool request_query_bool(struct request *request, const char *name, bool *value)
 {
     const char *text = request_query(request, name);

@@ -111,6 +111,8 @@ bool request_is_head(const struct request *request);
  * returns  false where it was refused (and answered) */
 bool request_query_number(struct request *request, const char *name, uint64_t minimum, uint64_t maximum,
                           uint64_t *value);
+/* A finite number, likewise. */
+bool request_query_real(struct request *request, const char *name, double minimum, double maximum, double *value);
 /* "true" or "false" of the query; absent: *value stays as it is. */
 bool request_query_bool(struct request *request, const char *name, bool *value);
 /* The body as a JSON object, the caller's to delete; NULL where it was refused (and answered). */

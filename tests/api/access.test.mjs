@@ -130,7 +130,7 @@ test('another project is not there', async (t) => {
   const json_patch = { 'Content-Type': 'application/json-patch+json', 'If-Match': '"1"' };
   const calls = [['GET', `/v1/strands/${mine.id}`], ['GET', `/v1/strands/${mine.id}/data`], ['GET', `/v1/heads/${head.id}`], ['GET', `/v1/heads/${head.id}/data`],
     ['GET', `/v1/jobs/${job.id}`], ['DELETE', `/v1/jobs/${job.id}`], ['GET', `/v1/jobs/${job.id}/events`], ['GET', `/v1/jobs/${job.id}/losses`],
-    ['GET', groom], ['GET', `${groom}/strands`], ['GET', `${groom}/guides`], ['GET', `${groom}/revisions`], ['GET', `${groom}/preview.png`],
+    ['GET', groom], ['GET', `${groom}/strands`], ['GET', `${groom}/guides`], ['GET', `${groom}/revisions`], ['GET', `${groom}/preview.png`], ['GET', `${groom}/turntable.png`],
     ['PATCH', groom, { headers: json_patch, body: '[]' }], ['PUT', `${groom}/guides`, { headers: { 'If-Match': '"1"' }, body: hair(4, 12) }],
     ['POST', `${groom}/revert`, { headers: { 'If-Match': '"1"' }, body: { revision: 1 } }]];
   for (const [method, path, options] of calls) {

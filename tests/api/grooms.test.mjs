@@ -185,4 +185,33 @@ test('pictures', async (t) => {
   await refused(daemon, 400, 'invalid-argument', 'GET', `${groom.at}/preview.png?view=below`, { problem: { parameter: 'view' } });
   await refused(daemon, 400, 'invalid-argument', 'GET', `${groom.at}/preview.png?size=9`, { problem: { parameter: 'size' } });
   await refused(daemon, 404, 'not-found', 'GET', '/v1/grooms/grm_nothing/preview.png');
+
+  await t.test('from a camera of one\'s own', async () => {
+    const get = async (query) => (await expect(daemon, 200, 'GET', `${groom.at}/preview.png?${query}`)).bytes;
+    const wide = await get('size=160x96&eye=0.8,1.9,1.2&target=0,1.6,0&fov=0.4&light=front');
+    assert.deepEqual([wide.readUInt32BE(16), wide.readUInt32BE(20)], [160, 96]);
+    assert.notDeepEqual(wide, await get('size=160x96&eye=0.8,1.9,1.2&target=0,1.6,0&fov=0.4'));
+    assert.deepEqual(await get('size=96&azimuth=0'), await get('size=96&view=front'));
+    assert.notDeepEqual(await get('size=96&azimuth=0.7&elevation=0.3'), await get('size=96&azimuth=0.7&elevation=0.3&distance=3'));
+    for (const [query, parameter] of [['view=side&azimuth=1', 'view'], ['eye=1,2,3', 'target'], ['eye=1,2,3&target=1,2,3', 'eye'],
+      ['eye=1,2&target=0,0,0', 'eye'], ['elevation=2', 'elevation'], ['fov=3', 'fov'], ['distance=0', 'distance'], ['light=moon', 'light'],
+      ['size=96x9', 'size'], ['size=96xx96', 'size'], ['target=nan,0,0', 'target']])
+      await refused(daemon, 400, 'invalid-argument', 'GET', `${groom.at}/preview.png?${query}`, { problem: { parameter } });
+  });
+});
+
+test('a turntable: an animated picture, and its frames as stills', async (t) => {
+  const daemon = await startDaemon(t), groom = await imported(daemon), at = `${groom.at}/turntable.png?frames=4&size=80x64&elevation=0.2`;
+  const { bytes, headers } = await expect(daemon, 200, 'GET', `${at}&frame_ms=50`), chunks = [];
+  assert.equal(headers.get('content-type'), 'image/apng');
+  for (let i = 8; i < bytes.length; i += 12 + bytes.readUInt32BE(i)) chunks.push([bytes.toString('latin1', i + 4, i + 8), bytes.subarray(i + 8, i + 8 + bytes.readUInt32BE(i))]);
+  assert.deepEqual(chunks.map(([type]) => type), ['IHDR', 'sRGB', 'acTL', 'fcTL', 'IDAT', 'fcTL', 'fdAT', 'fcTL', 'fdAT', 'fcTL', 'fdAT', 'IEND']);
+  assert.deepEqual(chunks.filter(([type]) => type === 'fcTL').map(([, data]) => [data.readUInt32BE(4), data.readUInt32BE(8), data.readUInt16BE(20), data.readUInt16BE(22)]),
+    Array(4).fill([80, 64, 50, 1000]));
+  const stills = await Promise.all([0, 1, 2, 3].map(async (k) => (await expect(daemon, 200, 'GET', `${at}&frame=${k}`)).bytes));
+  assert.equal(new Set(stills.map((still) => still.toString('latin1'))).size, 4, 'each frame another picture');
+  await expect(daemon, 304, 'GET', `${at}&frame=1`, { headers: { 'If-None-Match': (await expect(daemon, 200, 'GET', `${at}&frame=1`)).headers.get('etag') } });
+  for (const [query, parameter] of [['frames=1', 'frames'], ['frames=4&frame=4', 'frame'], ['size=2000', 'size'], ['frames=120&size=1024', 'frames'], ['frame_ms=5', 'frame_ms']])
+    await refused(daemon, 400, 'invalid-argument', 'GET', `${groom.at}/turntable.png?${query}`, { problem: { parameter } });
+  await refused(daemon, 404, 'not-found', 'GET', '/v1/grooms/grm_nothing/turntable.png');
 });

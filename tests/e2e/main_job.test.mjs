@@ -53,6 +53,18 @@ test('a sample goes in step by step and comes out as HAIR, USD and a picture', o
   assert.equal(readFileSync(png).toString('latin1', 1, 4), 'PNG');
   assert.ok(statSync(png).size > 2000, 'the picture is blank');
 
+  const above = join(folder, 'above.png'), turn = join(folder, 'turn.png'), stills = join(folder, 'turn');
+  await ok(daemon, ['preview', groom, '-o', above, '--size', '128x96', '--azimuth', '-40', '--elevation', '90', '--light', 'front']);
+  assert.deepEqual([readFileSync(above).readUInt32BE(16), readFileSync(above).readUInt32BE(20)], [128, 96]);
+  await ok(daemon, ['preview', groom, '-o', above, '--size', '128', '--eye', '0.5,1.8,0.9', '--target', '0,1.6,0', '--fov', '25']);
+  await ok(daemon, ['turntable', groom, '-o', turn, '--frames', '3', '--size', '96', '--seconds', '1.5']);
+  assert.ok(readFileSync(turn).includes('acTL'), 'it is animated');
+  await ok(daemon, ['turntable', groom, '--stills', stills, '--frames', '3', '--size', '96']);
+  assert.deepEqual(readdirSync(stills), ['frame_0000.png', 'frame_0001.png', 'frame_0002.png']);
+  for (const wrong of [['--frames', '1', '-o', turn], ['--seconds', 'x', '-o', turn], ['--elevation', 'up', '-o', turn], []])
+    assert.equal((await groomctl(daemon, ['turntable', groom, ...wrong])).status, 2);
+  assert.match((await groomctl(daemon, ['preview', groom, '-o', above, '--eye', '0,0,1'])).stderr, /needs a target/);
+
   const fewer = join(folder, 'few.hair'), guides = join(folder, 'guides.hair');
   await ok(daemon, ['export', groom, '-o', fewer, '--count', '100']);
   await ok(daemon, ['export', groom, '-o', guides, '--guides']);

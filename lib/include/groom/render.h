@@ -45,9 +45,24 @@ GROOM_MUST_CHECK groom_status groom_view_parse(const char *name, groom_view *vie
 #define GROOM_RENDER_MIN_SIZE 64
 #define GROOM_RENDER_MAX_SIZE 4096
 
+/* A camera of one's own. All zero: the front view. Azimuth and elevation (radians) say where it stands around
+ * what it looks at: 0, 0 before the face, azimuth pi/2 at the person's left, elevation pi/2 above. */
+struct groom_render_camera {
+    int is_placed;       /* it stands at `eye`, whatever azimuth, elevation and distance say */
+    double azimuth, elevation;
+    double distance;     /* from the target, metres; 0: far enough for all of the hair */
+    int has_target;      /* it looks at `target`; else at the middle of the hair */
+    double eye[3], target[3];
+    double fov_y;        /* radians from the lower to the upper edge; 0: 20 degrees */
+    int all_around;      /* so far away that the hair stays in the picture at any azimuth: for a turntable */
+    int light_stands;    /* the lights stand as they do for the front view; else they go with the camera */
+};
+
 struct groom_render_options {
     groom_view view;
-    uint32_t size;      /* the picture is size x size pixels */
+    uint32_t size;      /* the picture is size pixels wide */
+    uint32_t height;    /* and so many high; 0: size */
+    const struct groom_render_camera *camera; /* in place of the view; borrowed for the call. NULL: the view */
     float width_m;      /* of a hair; 0: 0.08 mm on a full head, wider for fewer strands */
     float color[3];     /* of hair, linear 0..1; {0, 0, 0}: brown */
     /* Other strands whose picture's camera this one is taken with, so that the two can be laid side by side;
@@ -56,12 +71,12 @@ struct groom_render_options {
 };
 
 /* Draw strands, on a head if there is one.
- * The camera is a long lens (20 degrees) at the height of the hair, framed so that the whole of
+ * A view's camera is a long lens (20 degrees) at the height of the hair, framed so that the whole of
  * the hair and the part of the head around it fills the picture with a small margin.
  * strands  at least one; points that are not finite are not drawn
  * head     may be NULL
- * rgba     [size][size][4], the caller's: sRGB, opaque, top row first
- * returns  GROOM_OK, GROOM_EINVAL (size, view), GROOM_EEMPTY (no strand), GROOM_ENOMEM, GROOM_ECANCELLED
+ * rgba     [height][size][4], the caller's: sRGB, opaque, top row first
+ * returns  GROOM_OK, GROOM_EINVAL (size, view, camera), GROOM_EEMPTY (no strand), GROOM_ENOMEM, GROOM_ECANCELLED
  * threads  same bits for any pool */
 GROOM_MUST_CHECK groom_status groom_render_strands(const struct groom_strands *strands,
                                                    const struct groom_mesh *head,
@@ -104,6 +119,29 @@ void groom_light_at(const struct groom_light *light, const float p[3], float *ke
 GROOM_MUST_CHECK groom_status groom_png_write(const uint8_t *rgba, uint32_t width, uint32_t height,
                                               struct groom_sink sink, const struct groom_context *context,
                                               struct groom_diag *diag);
+
+/* --- moving pictures ----------------------------------------------------------------- */
+
+/* An animated PNG (APNG, PNG third edition): shown by every browser, and as its first frame by what knows
+ * still PNGs alone. Frames are written as they come; memory: one frame. Nothing in the bytes depends on time or
+ * machine. The context, the sink and what it writes to stay until the end. */
+struct groom_animation;
+struct groom_animation_options {
+    uint32_t width, height;
+    uint32_t n_frames;  /* that will come, 1..65535 */
+    uint32_t frame_ms;  /* each is shown so long, 1..65535 */
+};
+/* returns  GROOM_OK, GROOM_EINVAL (a member out of its range), GROOM_ENOMEM, what the sink answers */
+GROOM_MUST_CHECK groom_status groom_animation_create(const struct groom_animation_options *options, struct groom_sink sink,
+                                                     const struct groom_context *context, struct groom_animation **animation,
+                                                     struct groom_diag *diag);
+/* rgba     [height][width][4]; alpha is left out
+ * returns  GROOM_OK, GROOM_EINVAL (one frame too many), GROOM_ENOMEM, what the sink answers */
+GROOM_MUST_CHECK groom_status groom_animation_add(struct groom_animation *animation, const uint8_t *rgba,
+                                                  struct groom_diag *diag);
+/* The file's end, once every frame is there. returns  GROOM_OK, GROOM_EINVAL (frames are missing), what the sink answers */
+GROOM_MUST_CHECK groom_status groom_animation_finish(struct groom_animation *animation, struct groom_diag *diag);
+void groom_animation_destroy(struct groom_animation *animation); /* takes NULL */
 
 #ifdef __cplusplus
 }
