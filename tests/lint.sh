@@ -28,6 +28,7 @@ declare -A room_of_header=(
     [strands]=strands [format]=strands
     [groom]=model [document]=model [quality]=quality
     [fit]=fit [sample]=sample [render]=render [curvature]=curvature [layers]=layers [analysis]=curvature [retarget]=retarget
+    [skeleton]=retarget [body]=retarget [correspondence]=retarget [hairline]=retarget
 )
 
 check_lib_include() { # file room included

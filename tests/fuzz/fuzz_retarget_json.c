@@ -1,0 +1,27 @@
+/* What a retargeting is told in JSON: whatever is taken prints as text that reads back the same. */
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "groom/skeleton.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_bytes);
+
+static void fuzz_skeleton(const char *text, size_t n_bytes)
+{
+    struct groom_skeleton skeleton = {0}, again = {0};
+    char *json;
+    if (groom_skeleton_parse(text, n_bytes, &skeleton, NULL) != GROOM_OK ||
+        groom_skeleton_print(&skeleton, &json, NULL) != GROOM_OK)
+        return;
+    if (groom_skeleton_parse(json, strlen(json), &again, NULL) != GROOM_OK || memcmp(&skeleton, &again, sizeof again) != 0)
+        abort();
+    free(json);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_bytes)
+{
+    if (n_bytes)
+        fuzz_skeleton((const char *)bytes, n_bytes);
+    return 0;
+}
