@@ -213,3 +213,20 @@ groom_status document_array_inline(cJSON *node, const struct groom_array_finder 
     cJSON_DeleteItemFromObjectCaseSensitive(node, "$array");
     return GROOM_OK;
 }
+
+groom_status document_array_keep(cJSON *node, const struct groom_array_keeper *keeper)
+{
+    const char *data = string_member(node, "data");
+    int64_t n_bytes = data ? base64_decoded_length(data, strlen(data)) : -1;
+    void *bytes = n_bytes > 0 ? malloc((size_t)n_bytes) : NULL;
+    groom_status status = GROOM_OK;
+    if (n_bytes <= 0)
+        return GROOM_OK;
+    if (!bytes)
+        return GROOM_ENOMEM;
+    if (base64_decode(data, strlen(data), bytes) == 0 &&
+        (status = add_reference(node, bytes, (size_t)n_bytes, keeper)) == GROOM_OK)
+        cJSON_DeleteItemFromObjectCaseSensitive(node, "data");
+    free(bytes);
+    return status;
+}

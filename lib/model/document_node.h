@@ -50,6 +50,9 @@ groom_status document_array_copy(const struct document_array *array, const struc
 groom_status document_array_create(const void *elements, enum document_dtype dtype, const uint32_t *shape,
                                    uint32_t n_dimensions, const struct groom_array_keeper *keeper, cJSON **node);
 
+/* Replace the bytes of an inline array by a reference, kept there; any other node stays, a damaged one among them. */
+groom_status document_array_keep(cJSON *node, const struct groom_array_keeper *keeper);
+
 /* Replace a reference by its bytes; a node that is inline already stays. */
 groom_status document_array_inline(cJSON *node, const struct groom_array_finder *finder, struct groom_diag *diag);
 

@@ -169,14 +169,32 @@ static int is_model_member(const char *name)
     return 0;
 }
 
+/* Calls visit on every array below node; recursion is as deep as the parser let the document be. */
+static groom_status each_array(cJSON *node, groom_status (*visit)(void *user, cJSON *array), void *user)
+{
+    if (document_array_is(node))
+        return visit(user, node);
+    for (cJSON *child = node->child; child; child = child->next) {
+        groom_status status = each_array(child, visit, user);
+        if (status != GROOM_OK)
+            return status;
+    }
+    return GROOM_OK;
+}
+
+static groom_status keep_array(void *user, cJSON *array) { return document_array_keep(array, user); }
+
 /* Moves what the model does not own from one tree to the other. */
 static void keep_other_members(struct writer *writer, cJSON *around)
 {
+    struct groom_array_keeper keeper = writer->keeper ? *writer->keeper : (struct groom_array_keeper){0};
     cJSON *child = around ? around->child : NULL;
     while (child) {
         cJSON *next = child->next;
         if (!is_model_member(child->string)) {
             cJSON_DetachItemViaPointer(around, child);
+            if (writer->keeper)
+                note(writer, each_array(child, keep_array, &keeper));
             if (!cJSON_AddItemToObject(writer->root, child->string, child)) {
                 cJSON_Delete(child);
                 note(writer, GROOM_ENOMEM);
@@ -220,19 +238,6 @@ out:
 }
 
 /* --- arrays from one form into the other ------------------------------------------- */
-
-/* Calls visit on every array below node; recursion is as deep as the parser let the document be. */
-static groom_status each_array(cJSON *node, groom_status (*visit)(void *user, cJSON *array), void *user)
-{
-    if (document_array_is(node))
-        return visit(user, node);
-    for (cJSON *child = node->child; child; child = child->next) {
-        groom_status status = each_array(child, visit, user);
-        if (status != GROOM_OK)
-            return status;
-    }
-    return GROOM_OK;
-}
 
 static groom_status transform(const char *json, size_t n_bytes, groom_status (*visit)(void *user, cJSON *array),
                               void *user, char **out, size_t *n_out, struct groom_diag *diag)

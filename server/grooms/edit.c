@@ -41,9 +41,10 @@ static groom_status edit_decode(struct edit *edit, const cJSON *document, struct
     return status;
 }
 
-static groom_status print_around(const struct edit *edit, cJSON *document, char **around)
+static groom_status print_around(struct edit *edit, cJSON *document, char **around)
 {
     documents_strip_model(document);
+    arrays_use(&edit->arrays, document);
     if (documents_set_number(document, "revision", edit->expected + 1) != GROOM_OK ||
         documents_set_number(document, "parent", edit->expected) != GROOM_OK ||
         !(*around = cJSON_PrintUnformatted(document)))

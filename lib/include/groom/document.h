@@ -79,7 +79,7 @@ GROOM_MUST_CHECK groom_status groom_document_read(const char *json, size_t n_byt
 
 /* Write a document.
  * around    a JSON object whose members that the model does not own are kept, or NULL
- * keeper    NULL: arrays inline
+ * keeper    takes every array, those of `around` that are inline among them; NULL: arrays inline, or as they are
  * json      zero-terminated, released by the caller with free()
  * returns   GROOM_OK, GROOM_EFORMAT (around is not a JSON object), GROOM_ENOMEM, what the keeper answers */
 GROOM_MUST_CHECK groom_status groom_document_write(const struct groom *groom, const char *around,
