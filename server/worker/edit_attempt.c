@@ -13,6 +13,7 @@
 #include "groom/spatial.h"
 #include "proto/work.h"
 #include "server/worker/clock.h"
+#include "server/worker/receive.h"
 #include "server/worker/worker.h"
 
 struct edit {
@@ -30,47 +31,18 @@ struct edit {
 
 /* --- what is needed ------------------------------------------------------------------------ */
 
-struct reception {
-    int fd, failed;
-};
-
-static void begin(void *user)
-{
-    struct reception *r = user;
-    r->failed = ftruncate(r->fd, 0) != 0 || lseek(r->fd, 0, SEEK_SET) != 0;
-}
-
-static size_t receive(void *user, const char *bytes, size_t n)
-{
-    struct reception *r = user;
-    size_t done = 0;
-    while (!r->failed && done < n) {
-        ssize_t written = write(r->fd, bytes + done, n - done);
-        if (written < 0 && errno != EINTR)
-            return 0;
-        done += written > 0 ? (size_t)written : 0;
-    }
-    return r->failed ? 0 : n;
-}
-
 static groom_status take_strands(struct edit *e)
 {
-    struct reception reception = {.fd = memfd_create("strands", MFD_CLOEXEC)};
     const struct groom_read_options options = {.format = GROOM_FORMAT_HAIR};
-    const struct http_request request = {.method = "GET", .path = WORK_PATH_STRANDS, .sink = receive, .begin = begin,
-                                         .user = &reception};
-    if (reception.fd < 0)
-        return groom_fail(e->diag, GROOM_ENOMEM, "no memory for the strands");
-    groom_status st = work_link_call(e->link, &request, NULL, e->diag);
-    if (st == GROOM_OK && (lseek(reception.fd, 0, SEEK_SET) != 0 || reception.failed))
-        st = groom_fail(e->diag, GROOM_EIO, "the strands could not be kept");
-    if (st == GROOM_OK) {
-        struct worker_input input;
-        worker_input_open(reception.fd, &input);
-        st = groom_strands_read(&input.source, &options, e->context, &e->before, NULL, e->diag);
-        worker_input_close(&input);
-    }
-    close(reception.fd);
+    struct worker_input input;
+    int fd;
+    groom_status st = receive(e->link, WORK_PATH_STRANDS, &fd, e->diag);
+    if (st != GROOM_OK)
+        return st;
+    worker_input_open(fd, &input);
+    st = groom_strands_read(&input.source, &options, e->context, &e->before, NULL, e->diag);
+    worker_input_close(&input);
+    close(fd);
     return st == GROOM_OK ? groom_create_of_strands(e->before, e->context, &e->groom, e->diag) : st;
 }
 
