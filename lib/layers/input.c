@@ -136,9 +136,8 @@ static groom_status list_strands(const struct groom *groom, uint32_t index, stru
     return input->strand ? GROOM_OK : GROOM_ENOMEM;
 }
 
-/* All but the conversion. */
-static groom_status begin(const struct groom *groom, uint32_t index, const struct groom_strands *before,
-                          const struct groom_context *context, struct groom_layer_input **out, struct groom_diag *diag)
+groom_status input_begin(const struct groom *groom, uint32_t index, const struct groom_strands *before,
+                         const struct groom_context *context, struct groom_layer_input **out, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     const struct groom_layer *layer = groom->operators[index].layer;
@@ -163,7 +162,7 @@ groom_status groom_layer_count(const struct groom *groom, uint32_t index, const 
                                const struct groom_context *context, uint32_t *n, struct groom_diag *diag)
 {
     struct groom_layer_input *input = NULL;
-    groom_status status = begin(groom, index, before, context, &input, diag);
+    groom_status status = input_begin(groom, index, before, context, &input, diag);
     if (status == GROOM_OK)
         *n = input->n;
     groom_layer_input_destroy(input);
@@ -175,7 +174,7 @@ groom_status groom_layer_input_create(const struct groom *groom, uint32_t index,
                                       struct groom_diag *diag)
 {
     struct groom_layer_input *input = NULL;
-    groom_status status = begin(groom, index, before, context, &input, diag);
+    groom_status status = input_begin(groom, index, before, context, &input, diag);
     if (status == GROOM_OK && (status = convert(input, before, context, diag)) != GROOM_OK) {
         groom_layer_input_destroy(input);
         return status;
@@ -184,6 +183,68 @@ groom_status groom_layer_input_create(const struct groom *groom, uint32_t index,
         *out = input;
     return status;
 }
+
+/* --- a part of it ---------------------------------------------------------------------------- */
+
+/* Offsets from the part's first. */
+static uint32_t *rebase(const uint32_t *first, uint32_t n, const struct groom_allocator *allocator)
+{
+    uint32_t *out = memory_array(allocator, (size_t)n + 1, sizeof *out);
+    for (uint32_t k = 0; out && k <= n; k++)
+        out[k] = first[k] - first[0];
+    return out;
+}
+
+static groom_status view_conversion(struct input_part *part, const struct groom_conversion *whole, uint32_t begin,
+                                    struct groom_diag *diag)
+{
+    uint32_t n = part->input.n, element = whole->helices->first[begin], vertex = whole->first[begin];
+    part->first_element = rebase(whole->helices->first + begin, n, part->input.allocator);
+    part->first_vertex = rebase(whole->first + begin, n, part->input.allocator);
+    if (!part->first_element || !part->first_vertex)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for a layer");
+    part->helices = *whole->helices;
+    part->helices.n_strands = n;
+    part->helices.n_elements = part->first_element[n];
+    part->helices.first = part->first_element;
+    part->helices.root += begin;
+    part->helices.frame += begin;
+    part->helices.length += element;
+    part->helices.q += element;
+    part->view = *whole;
+    part->view.helices = &part->helices;
+    part->view.n_strands = n;
+    part->view.n_vertices = part->first_vertex[n];
+    part->view.first = part->first_vertex;
+    part->view.at += vertex;
+    part->view.reports += begin;
+    part->input.conversion = &part->view;
+    return GROOM_OK;
+}
+
+groom_status input_part_init(struct input_part *part, const struct groom_layer_input *whole, uint32_t begin, uint32_t n,
+                             const struct groom_strands *before, const struct groom_context *context,
+                             struct groom_diag *diag)
+{
+    *part = (struct input_part){.input = *whole};
+    part->input.n = n;
+    part->input.strand += begin;
+    if (whole->conversion)
+        return view_conversion(part, whole->conversion, begin, diag);
+    groom_status status = convert(&part->input, before, context, diag);
+    part->own = part->input.conversion;
+    return status;
+}
+
+void input_part_finish(struct input_part *part)
+{
+    const struct groom_allocator *allocator = part->input.allocator;
+    groom_conversion_destroy(part->own);
+    memory_release(allocator, part->first_element, (size_t)part->input.n + 1, sizeof *part->first_element);
+    memory_release(allocator, part->first_vertex, (size_t)part->input.n + 1, sizeof *part->first_vertex);
+}
+
+/* --- kept ------------------------------------------------------------------------------------ */
 
 void groom_layer_input_destroy(struct groom_layer_input *input)
 {

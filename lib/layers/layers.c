@@ -3,10 +3,7 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "layers/room.h"
-
-#define PIECE 256 /* strands */
 
 /* --- pieces of the chain ----------------------------------------------------------------- */
 
@@ -63,64 +60,6 @@ groom_status groom_layers_evaluate(const struct groom *groom, const struct groom
     return status;
 }
 
-/* --- back to vertices ------------------------------------------------------------------------ */
-
-struct scatter {
-    const struct work *work;
-    const struct groom_superhelices *changed;
-    float (*sampled)[3];        /* of the input's strands, one after the other */
-    struct groom_strands *after;
-    uint32_t *n_changed;        /* [pieces] */
-};
-
-static int is_same(const struct groom_superhelices *a, const struct groom_superhelices *b, uint32_t i)
-{
-    uint32_t n = a->first[i + 1] - a->first[i];
-    return n == b->first[i + 1] - b->first[i] && memcmp(a->root[i], b->root[i], sizeof a->root[i]) == 0 &&
-           memcmp(a->frame[i], b->frame[i], sizeof a->frame[i]) == 0 &&
-           memcmp(a->q[a->first[i]], b->q[b->first[i]], n * sizeof *a->q) == 0 &&
-           memcmp(&a->length[a->first[i]], &b->length[b->first[i]], n * sizeof *a->length) == 0;
-}
-
-static void scatter_piece(void *user, uint32_t piece, uint32_t thread)
-{
-    (void)thread;
-    const struct scatter *job = user;
-    const struct groom_layer_input *input = job->work->input;
-    uint32_t end = input->n - piece * PIECE < PIECE ? input->n : (piece + 1) * PIECE;
-    for (uint32_t k = piece * PIECE; k < end; k++) {
-        uint32_t i = input->strand[k], m = job->after->first[i + 1] - job->after->first[i];
-        if (is_same(input->conversion->helices, job->changed, k))
-            continue;
-        memcpy(job->after->points + job->after->first[i], job->sampled + input->conversion->first[k],
-               m * sizeof *job->sampled);
-        job->n_changed[piece]++;
-    }
-}
-
-/* Strands that changed get their new vertices; the others keep their own. */
-static groom_status scatter(struct scatter *job, const struct groom_allocator *allocator)
-{
-    const struct work *work = job->work;
-    const struct groom_conversion *c = work->input->conversion;
-    uint32_t n_pieces = work->input->n / PIECE + (work->input->n % PIECE != 0);
-    groom_status status = GROOM_ENOMEM;
-    job->sampled = memory_array(allocator, c->n_vertices, sizeof *job->sampled);
-    job->n_changed = memory_array_zero(allocator, n_pieces, sizeof *job->n_changed);
-    if (job->sampled && job->n_changed)
-        status = groom_superhelices_sample_at(job->changed, c->first, c->at, job->sampled, work->context, work->diag);
-    else
-        groom_fail(work->diag, status, "no memory to sample %u strands", work->input->n);
-    if (status == GROOM_OK) {
-        parallel_for(work->context, n_pieces, scatter_piece, job);
-        for (uint32_t p = 0; p < n_pieces; p++)
-            work->report->n_changed += job->n_changed[p];
-    }
-    memory_release(allocator, job->sampled, c->n_vertices, sizeof *job->sampled);
-    memory_release(allocator, job->n_changed, n_pieces, sizeof *job->n_changed);
-    return status;
-}
-
 static groom_status copy_strands(const struct work *work, struct groom_strands **out)
 {
     const struct groom_strands *from = work->before;
@@ -144,44 +83,19 @@ groom_status layer_place(const struct work *work, groom_status status)
     return status;
 }
 
-static groom_status change(const struct work *work, struct groom_superhelices **changed)
+static groom_status run(struct work *work)
 {
-    switch (work->op->type) {
-    case GROOM_OPERATOR_RUFFLE: return layer_ruffle(work, changed);
-    case GROOM_OPERATOR_SCULPT: return layer_sculpt(work, changed);
-    case GROOM_OPERATOR_INTERPOLATE: return layer_interpolate(work, changed);
-    case GROOM_OPERATOR_CURL_SCALE: return layer_curl_scale(work, changed);
-    default: return groom_fail(work->diag, GROOM_EINVAL, "operator %u is not a layer", work->index);
-    }
-}
-
-static void tell_input(const struct work *work)
-{
-    const struct groom_layer_input *input = work->input;
-    work->report->n_strands = input->n;
-    for (uint32_t k = 0; k < input->n; k++)
-        if (input->conversion->reports[k].error_rms_m > work->report->conversion_error_m)
-            work->report->conversion_error_m = input->conversion->reports[k].error_rms_m;
-}
-
-static groom_status run(const struct work *work, struct groom_strands **out)
-{
-    struct groom_superhelices *changed = NULL;
-    struct groom_strands *after = NULL;
-    groom_status status = copy_strands(work, &after);
-    if (status == GROOM_OK && work->input->n > 0) {
-        tell_input(work);
-        status = change(work, &changed);
-        struct scatter job = {.work = work, .changed = changed, .after = after};
-        if (status == GROOM_OK)
-            status = scatter(&job, memory_allocator(work->context));
-    }
-    groom_superhelices_destroy(changed);
+    groom_status status = GROOM_OK;
+    if (work->input->n == 0)
+        return status;
+    if (work->op->type == GROOM_OPERATOR_SCULPT)
+        status = layer_sculpt_begin(work);
     if (status == GROOM_OK)
-        *out = after;
-    else
-        groom_strands_destroy(after);
-    return layer_place(work, status);
+        status = layer_run_blocks(work);
+    if (status == GROOM_OK && work->op->type == GROOM_OPERATOR_SCULPT)
+        status = layer_sculpt_tell(work);
+    layer_sculpt_end(work);
+    return status;
 }
 
 static groom_status check_before(const struct groom *groom, uint32_t index, const struct groom_strands *before,
@@ -195,23 +109,49 @@ static groom_status check_before(const struct groom *groom, uint32_t index, cons
     return GROOM_OK;
 }
 
+static groom_status make_input(const struct work *work, struct groom_layer_input **own)
+{
+    return layer_is_strand_by_strand(work->op->type)
+               ? input_begin(work->groom, work->index, work->before, work->context, own, work->diag)
+               : groom_layer_input_create(work->groom, work->index, work->before, work->context, own, work->diag);
+}
+
 /* With the input that was kept, or one of its own. */
-static groom_status apply(struct work *work, struct groom_strands **after)
+static groom_status apply(struct work *work)
 {
     struct groom_layer_input *own = NULL;
-    groom_status status = check_before(work->groom, work->index, work->before, work->diag);
-    if (status != GROOM_OK)
-        return status;
+    groom_status status = GROOM_OK;
     work->op = &work->groom->operators[work->index];
     work->layer = work->op->layer;
     memset(work->report, 0, sizeof *work->report);
-    if (!work->input && (status = layer_place(work, groom_layer_input_create(work->groom, work->index, work->before,
-                                                                             work->context, &own, work->diag))) == GROOM_OK)
+    if (!work->input && (status = make_input(work, &own)) == GROOM_OK)
         work->input = own;
     if (status == GROOM_OK)
-        status = run(work, after);
+        status = run(work);
     groom_layer_input_destroy(own);
+    return layer_place(work, status);
+}
+
+/* On a copy. */
+static groom_status apply_to_copy(struct work *work, struct groom_strands **after)
+{
+    groom_status status = check_before(work->groom, work->index, work->before, work->diag);
+    if (status == GROOM_OK)
+        status = copy_strands(work, &work->after);
+    if (status == GROOM_OK && (status = apply(work)) == GROOM_OK)
+        *after = work->after;
+    else
+        groom_strands_destroy(work->after);
     return status;
+}
+
+/* What held strands outside the head is found anew. */
+static groom_status find_contact(struct work *work, struct groom *groom)
+{
+    if (work->index >= groom->n_operators || groom->operators[work->index].type != GROOM_OPERATOR_SCULPT)
+        return GROOM_OK;
+    work->contact = &groom->operators[work->index].layer->contact;
+    return groom_layer_anchors_resize(work->contact, 0, groom->allocator);
 }
 
 groom_status groom_layer_apply(const struct groom *groom, uint32_t index, const struct groom_strands *before,
@@ -221,7 +161,7 @@ groom_status groom_layer_apply(const struct groom *groom, uint32_t index, const 
     struct groom_layer_report unwanted = {0};
     struct work work = {.groom = groom, .index = index, .before = before, .input = input, .context = context,
                         .report = report ? report : &unwanted, .diag = diag};
-    return apply(&work, after);
+    return apply_to_copy(&work, after);
 }
 
 groom_status groom_layer_apply_outside(struct groom *groom, uint32_t index, const struct groom_strands *before,
@@ -232,10 +172,20 @@ groom_status groom_layer_apply_outside(struct groom *groom, uint32_t index, cons
     struct groom_layer_report unwanted = {0};
     struct work work = {.groom = groom, .index = index, .before = before, .input = input, .head = head, .context = context,
                         .report = report ? report : &unwanted, .diag = diag};
-    if (index < groom->n_operators && groom->operators[index].type == GROOM_OPERATOR_SCULPT) {
-        work.contact = &groom->operators[index].layer->contact;
-        if (groom_layer_anchors_resize(work.contact, 0, groom->allocator) != GROOM_OK)
-            return groom_fail(diag, GROOM_ENOMEM, "no memory for a layer");
-    }
-    return apply(&work, after);
+    if (find_contact(&work, groom) != GROOM_OK)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for a layer");
+    return apply_to_copy(&work, after);
+}
+
+groom_status groom_layer_change(struct groom *groom, uint32_t index, struct groom_strands *strands,
+                                const struct groom_bvh *head, const struct groom_context *context,
+                                struct groom_layer_report *report, struct groom_diag *diag)
+{
+    struct groom_layer_report unwanted = {0};
+    struct work work = {.groom = groom, .index = index, .before = strands, .after = strands, .head = head,
+                        .context = context, .report = report ? report : &unwanted, .diag = diag};
+    groom_status status = check_before(groom, index, strands, diag);
+    if (status == GROOM_OK && head && find_contact(&work, groom) != GROOM_OK)
+        status = groom_fail(diag, GROOM_ENOMEM, "no memory for a layer");
+    return status == GROOM_OK ? apply(&work) : status;
 }

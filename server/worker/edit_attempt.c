@@ -21,10 +21,9 @@ struct edit {
     const struct groom_context *context;
     struct progress_report *progress;
     struct groom_diag *diag;
-    struct groom_strands *before, *after;
+    struct groom_strands *strands;
     struct groom *groom;             /* of the strands, with the layer alone */
     struct groom_bvh *head;
-    struct groom_layer_input *input;
     struct groom_layer_report report;
     double started_s;
 };
@@ -40,10 +39,10 @@ static groom_status take_strands(struct edit *e)
     if (st != GROOM_OK)
         return st;
     worker_input_open(fd, &input);
-    st = groom_strands_read(&input.source, &options, e->context, &e->before, NULL, e->diag);
+    st = groom_strands_read(&input.source, &options, e->context, &e->strands, NULL, e->diag);
     worker_input_close(&input);
     close(fd);
-    return st == GROOM_OK ? groom_create_of_strands(e->before, e->context, &e->groom, e->diag) : st;
+    return st == GROOM_OK ? groom_create_of_strands(e->strands, e->context, &e->groom, e->diag) : st;
 }
 
 static groom_status take_layer(struct edit *e)
@@ -59,20 +58,12 @@ static groom_status take_layer(struct edit *e)
 
 /* --- the work ---------------------------------------------------------------------------------- */
 
+/* In place: what came in is what goes out. */
 static groom_status solve(struct edit *e)
 {
-    progress_report_stage(e->progress, "convert", 0, 2, 0.0, 0.5);
+    progress_report_stage(e->progress, groom_operator_name(e->groom->operators[0].type), 0, 1, 0.0, 1.0);
     groom_status st = progress_report_send(e->progress, 1);
-    if (st == GROOM_OK)
-        st = groom_layer_input_create(e->groom, 0, e->before, e->context, &e->input, e->diag);
-    progress_report_stage(e->progress, "solve", 1, 2, 0.5, 1.0);
-    if (st == GROOM_OK)
-        st = progress_report_send(e->progress, 1);
-    if (st != GROOM_OK)
-        return st;
-    return e->head ? groom_layer_apply_outside(e->groom, 0, e->before, e->input, e->head, e->context, &e->after, &e->report,
-                                               e->diag)
-                   : groom_layer_apply(e->groom, 0, e->before, e->input, e->context, &e->after, &e->report, e->diag);
+    return st == GROOM_OK ? groom_layer_change(e->groom, 0, e->strands, e->head, e->context, &e->report, e->diag) : st;
 }
 
 /* --- the result ----------------------------------------------------------------------------------- */
@@ -128,7 +119,7 @@ static groom_status write_result(const struct edit *e, int fd)
     if (st == GROOM_OK)
         st = sink.write(sink.user, "\n", 1);
     cJSON_free(line);
-    return st == GROOM_OK ? groom_strands_write(e->after, &options, sink, e->context, e->diag) : st;
+    return st == GROOM_OK ? groom_strands_write(e->strands, &options, sink, e->context, e->diag) : st;
 }
 
 static groom_status deliver(struct edit *e)
@@ -166,10 +157,8 @@ groom_status edit_attempt(struct work_link *link, const struct groom_mesh *head,
         st = solve(&e);
     if (st == GROOM_OK)
         st = deliver(&e);
-    groom_layer_input_destroy(e.input);
     groom_bvh_destroy(e.head);
     groom_destroy(e.groom);
-    groom_strands_destroy(e.before);
-    groom_strands_destroy(e.after);
+    groom_strands_destroy(e.strands);
     return st;
 }

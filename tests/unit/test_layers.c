@@ -148,6 +148,93 @@ static void shift_cluster(struct groom *groom, struct groom_operator *op, uint32
     op->layer->frames[0] = (struct groom_layer_frame){cluster, 0.8f, {{1, 0, 0, 0.015f}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
 }
 
+/* Some strands by their own anchors, listed from the last to the first, others by two frames of their clusters. */
+static void pull_many(struct groom *groom, struct groom_operator *op, uint32_t n)
+{
+    struct groom_layer_anchors *anchors = &op->layer->anchors;
+    shift_cluster(groom, op, 5, 2);
+    ck_ok(groom_layer_frames_resize(op->layer, 2, groom->allocator));
+    for (uint32_t k = 0; k < 2; k++)
+        op->layer->frames[k] = (struct groom_layer_frame){1 + 2 * k, 0.8f, {{1, 0, 0, 0.01f}, {0, 1, 0, 0}, {0, 0, 1, 0.01f}}};
+    ck_ok(groom_layer_anchors_resize(anchors, n / 3, groom->allocator));
+    for (uint32_t k = 0; k < n / 3; k++) {
+        uint32_t i = anchors->strand[k] = n - 1 - 3 * k;
+        anchors->at[k] = 1.0f;
+        memcpy(anchors->position[k], groom->base[groom->first[i + 1] - 1], sizeof(float[3]));
+        anchors->position[k][1] += 0.015f;
+    }
+    ck_ok(groom_validate(groom, NULL));
+}
+
+START_TEST(many_strands_change_the_same_fresh_kept_and_in_place)
+{
+    enum { N = 300 }; /* some blocks, the last one short */
+    struct groom *groom = coils(N, 9);
+    struct groom_strands *rest = evaluate(groom), *fresh, *kept;
+    struct groom_layer_input *input;
+    struct groom_layer_report reports[3];
+    struct groom_context context = {0};
+    ck_ok(groom_pool_create(3, &context.pool));
+    pull_many(groom, append(groom, GROOM_OPERATOR_SCULPT, 1), N);
+    ck_ok(groom_layer_apply(groom, 0, rest, NULL, NULL, &fresh, &reports[0], NULL));
+    ck_ok(groom_layer_input_create(groom, 0, rest, &context, &input, NULL));
+    ck_ok(groom_layer_apply(groom, 0, rest, input, &context, &kept, &reports[1], NULL));
+    ck_ok(groom_layer_change(groom, 0, rest, NULL, &context, &reports[2], NULL));
+    ck_assert_uint_eq(n_different(fresh, kept), 0);
+    ck_assert_uint_eq(n_different(fresh, rest), 0);
+    ck_assert_uint_gt(reports[0].n_changed, N / 3);
+    ck_assert_uint_gt(reports[0].sculpt.n_anchors, reports[0].n_changed); /* some strands have both */
+    for (int k = 1; k < 3; k++)
+        ck_assert_mem_eq(&reports[k], &reports[0], sizeof reports[0]);
+    groom_layer_input_destroy(input);
+    groom_pool_destroy(context.pool);
+    groom_strands_destroy(rest);
+    groom_strands_destroy(fresh);
+    groom_strands_destroy(kept);
+    groom_destroy(groom);
+}
+END_TEST
+
+START_TEST(a_frame_that_takes_strands_too_far_is_named)
+{
+    struct groom *groom = coils(300, 9);
+    struct groom_operator *op = append(groom, GROOM_OPERATOR_SCULPT, 1);
+    struct groom_strands *strands = NULL;
+    struct groom_diag diag = {0};
+    pull_many(groom, op, 300);
+    op->layer->frames[1].transform[2][3] = INFINITY;
+    ck_status(groom_layers_evaluate(groom, NULL, &strands, &diag), GROOM_EINVAL);
+    ck_assert_str_eq(diag.pointer, "/operators/0/frames/1/transform");
+    groom_destroy(groom);
+}
+END_TEST
+
+static void note_fraction(void *user, double fraction)
+{
+    double *last = user;
+    ck_assert(fraction > *last && fraction <= 1.0);
+    *last = fraction;
+}
+
+static int after_a_tenth(void *user) { return *(double *)user > 0.1; }
+
+START_TEST(a_large_layer_tells_how_far_it_is_and_can_be_stopped)
+{
+    enum { N = 20000 };
+    struct groom *groom = coils(N, 9);
+    struct groom_strands *rest = evaluate(groom);
+    double last = 0.0;
+    struct groom_progress progress = {.report = note_fraction, .cancelled = after_a_tenth, .user = &last};
+    struct groom_context context = {.progress = &progress};
+    pull_many(groom, append(groom, GROOM_OPERATOR_SCULPT, 1), N);
+    groom->operators[0].layer->n_elements = 6;
+    ck_status(groom_layer_change(groom, 0, rest, NULL, &context, NULL, NULL), GROOM_ECANCELLED);
+    ck_assert(last > 0.1 && last < 1.0);
+    groom_strands_destroy(rest);
+    groom_destroy(groom);
+}
+END_TEST
+
 START_TEST(a_moved_frame_takes_its_cluster_along)
 {
     struct groom *groom = coils(40, 4);
@@ -393,35 +480,36 @@ static struct groom_mesh *octahedron(void)
 }
 
 /* Straight strands up from the side of the head, and tips that are pulled across to its other side. */
-static struct groom *standing(void)
+static struct groom *standing(uint32_t n)
 {
     struct groom_strands *strands;
     struct groom *groom;
-    ck_ok(groom_strands_create(4, 4 * 31, NULL, &strands, NULL));
-    for (uint32_t i = 0; i < 4; i++) {
+    ck_ok(groom_strands_create(n, n * 31, NULL, &strands, NULL));
+    for (uint32_t i = 0; i < n; i++) {
         strands->first[i + 1] = 31 * (i + 1);
         for (uint32_t j = 0; j < 31; j++) {
             float *p = strands->points[31 * i + j];
-            p[0] = 0.06f + 0.006f * (float)j, p[1] = 0.04f, p[2] = 0.004f * (float)i;
+            p[0] = 0.06f + 0.006f * (float)j, p[1] = 0.04f, p[2] = 0.004f * (float)(i % 4);
         }
     }
     ck_ok(groom_create_of_strands(strands, NULL, &groom, NULL));
     groom_strands_destroy(strands);
     struct groom_layer_anchors *anchors = &append(groom, GROOM_OPERATOR_SCULPT, 1)->layer->anchors;
-    ck_ok(groom_layer_anchors_resize(anchors, 4, groom->allocator));
-    for (uint32_t i = 0; i < 4; i++) {
+    ck_ok(groom_layer_anchors_resize(anchors, n, groom->allocator));
+    for (uint32_t i = 0; i < n; i++) {
         anchors->strand[i] = i;
         anchors->at[i] = 1.0f;
         anchors->position[i][0] = -0.08f;
         anchors->position[i][1] = 0.03f;
-        anchors->position[i][2] = 0.004f * (float)i;
+        anchors->position[i][2] = 0.004f * (float)(i % 4);
     }
     return groom;
 }
 
 START_TEST(contact_is_kept_in_the_layer)
 {
-    struct groom *groom = standing();
+    enum { N = 140 }; /* more than a block */
+    struct groom *groom = standing(N);
     struct groom_mesh *mesh = octahedron();
     struct groom_bvh *bvh;
     struct groom_strands *rest, *outside, *again;
@@ -429,11 +517,15 @@ START_TEST(contact_is_kept_in_the_layer)
     ck_ok(groom_bvh_create(mesh, NULL, &bvh, NULL));
     ck_ok(groom_evaluate_between(groom, 0, 0, NULL, NULL, &rest, NULL));
     ck_ok(groom_layer_apply_outside(groom, 0, rest, NULL, bvh, NULL, &outside, &report, NULL));
-    ck_assert_uint_eq(report.contact.n_checked, 4);
+    ck_assert_uint_eq(report.contact.n_checked, N);
     ck_assert_uint_gt(report.contact.n_entered, 0);
-    ck_assert_uint_gt(groom->operators[0].layer->contact.n, 0);
+    const struct groom_layer_anchors *contact = &groom->operators[0].layer->contact;
+    ck_assert_uint_gt(contact->n, 0);
+    for (uint32_t k = 1; k < contact->n; k++)
+        ck_assert_uint_le(contact->strand[k - 1], contact->strand[k]);
+    ck_assert_uint_gt(contact->strand[contact->n - 1], 130);
     ck_assert(report.contact.depth_after_m < 0.25f * report.contact.depth_before_m);
-    ck_assert_uint_eq(report.sculpt.n_anchors, 4);
+    ck_assert_uint_eq(report.sculpt.n_anchors, N);
     ck_ok(groom_validate(groom, NULL));
     ck_ok(groom_layer_apply(groom, 0, rest, NULL, NULL, &again, &later, NULL)); /* no head here */
     ck_assert_uint_eq(n_different(outside, again), 0);
@@ -447,6 +539,8 @@ START_TEST(contact_is_kept_in_the_layer)
 END_TEST
 
 TEST_SUITE("layers", sculpt_moves_what_is_pulled_and_nothing_else, an_input_kept_from_before_gives_the_same_bits,
+           many_strands_change_the_same_fresh_kept_and_in_place, a_frame_that_takes_strands_too_far_is_named,
+           a_large_layer_tells_how_far_it_is_and_can_be_stopped,
            a_moved_frame_takes_its_cluster_along, an_empty_cluster_is_refused_with_its_frame,
            another_seed_ruffles_to_another_head, ruffling_stays_within_groups, curls_of_one_group_are_widened,
            interpolation_ends_at_both_grooms, a_chain_with_layers_is_the_same_for_any_pool,

@@ -102,6 +102,15 @@ GROOM_MUST_CHECK groom_status groom_layer_apply_outside(struct groom *groom, uin
                                                         struct groom_strands **after,
                                                         struct groom_layer_report *report, struct groom_diag *diag);
 
+/* Either, on strands that are the caller's and change in place: no second copy of a head of hair.
+ * strands  those that come into the layer, then those behind it; after an error any of them may have changed
+ * head     a sculpt stays outside, as with groom_layer_apply_outside; NULL: as with groom_layer_apply
+ * context  its progress runs over the strands
+ * returns  as groom_layer_apply */
+GROOM_MUST_CHECK groom_status groom_layer_change(struct groom *groom, uint32_t index, struct groom_strands *strands,
+                                                 const struct groom_bvh *head, const struct groom_context *context,
+                                                 struct groom_layer_report *report, struct groom_diag *diag);
+
 #ifdef __cplusplus
 }
 #endif
