@@ -7,6 +7,8 @@
 #include "fit/checksum.h"
 #include "fit/state.h"
 
+#define MOST_GUIDES 10000 /* that options can ask for */
+
 static const char magic[8] = {'G', 'R', 'O', 'O', 'M', 'F', 'I', 'T'};
 
 /* One walk over the state serves both ways: with a pen that writes, counts or reads, so that what is
@@ -137,8 +139,13 @@ static void pen_clusters(struct pen *pen, struct groom_fit *fit)
     pen_bytes(pen, fit->cluster_of, fit->n * sizeof *fit->cluster_of);
 }
 
-/* Numbers that a descent can move at most: a strand's and an operator guide's. */
-static uint64_t most_moments(const struct groom_fit *fit) { return (uint64_t)fit->n * GROOM_FIT_MAX_OPERATORS * 4; }
+/* Numbers that a descent keeps at most: two for each random number of strands and operator guides, or nine
+ * for each vertex of the guides (paper_guides.h). */
+static uint64_t most_moments(const struct groom_fit *fit)
+{
+    uint64_t n_guides = fit->n < MOST_GUIDES ? fit->n : MOST_GUIDES;
+    return (uint64_t)fit->n * GROOM_FIT_MAX_OPERATORS * 4 + n_guides * fit->m * 9;
+}
 
 static void pen_moments(struct pen *pen, struct groom_fit *fit)
 {
@@ -266,7 +273,8 @@ static int sound_state(const struct groom_fit *fit)
 static uint64_t most_bytes(const struct groom_fit *fit)
 {
     uint64_t n = fit->n, points = n * fit->m * 12;
-    return 4096 + sizeof fit->report + 2 * points + n * (16 * 8 + 64 + GROOM_FIT_MAX_OPERATORS * 24);
+    return 4096 + sizeof fit->report + 2 * points + n * (16 * 8 + 64 + GROOM_FIT_MAX_OPERATORS * 8) +
+           4 * most_moments(fit);
 }
 
 static groom_status read_all(const struct groom_source *source, unsigned char *bytes, uint64_t n)

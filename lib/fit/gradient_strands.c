@@ -7,8 +7,8 @@
 #include "base/blas.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "quality/waves.h"
 
-#define PI 3.14159265358979323846
 #define UNIT 0.1 /* metres on an ordinary head */
 #define LEAST_LENGTH 1e-12
 #define LEAST_MAGNITUDE 1e-6f
@@ -28,16 +28,6 @@ struct gradient_strands {
 };
 
 /* --- directions and their transforms ------------------------------------------------------- */
-
-static void make_waves(uint32_t n, uint32_t h, float *waves)
-{
-    for (uint32_t k = 0; k < h; k++)
-        for (uint32_t j = 0; j < n; j++) {
-            double angle = 2 * PI * (double)((uint64_t)k * j % n) / n;
-            waves[(size_t)k * n + j] = (float)cos(angle);
-            waves[(size_t)(h + k) * n + j] = (float)sin(angle);
-        }
-}
 
 /* Unit directions [3][n] of a polyline; its segments' lengths [n], and their sum. */
 static double directions_of(const float (*x)[3], uint32_t n, double scale, float *direction, float *length)
@@ -183,7 +173,7 @@ static groom_status measure_target(struct gradient_strands *g, const struct groo
     if (!job.scratch)
         return GROOM_ENOMEM;
     blas_prepare();
-    make_waves(g->n_segments, g->n_waves, g->waves);
+    waves_fill(g->n_segments, g->n_waves, g->waves);
     parallel_for(context, g->n_pieces, measure_piece, &job);
     memory_release(g->allocator, job.scratch, n_scratch, sizeof *job.scratch);
     return GROOM_OK;
@@ -194,7 +184,7 @@ groom_status gradient_strands_create(const struct groom_fit *fit, const struct g
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     struct gradient_strands *g = memory_array_zero(allocator, 1, sizeof *g);
-    uint32_t n = fit->m - 1, h = n / 2 + 1;
+    uint32_t n = fit->m - 1, h = waves_count(n);
     groom_status st = GROOM_ENOMEM;
     if (!g)
         return groom_fail(diag, st, "no memory for a gradient");

@@ -9,7 +9,9 @@
  * at equal steps of arc length: one length a guide, no ripples.
  *
  * Guides that end up in the head where their strands are out are held at its surface, and the problem is
- * solved again. */
+ * solved again.
+ *
+ * method "paper" is the paper's own, as a reference (paper_guides.h). */
 #include <math.h>
 #include <string.h>
 
@@ -17,7 +19,9 @@
 #include "base/progress.h"
 #include "fit/guide_laplacian.h"
 #include "fit/guide_system.h"
+#include "fit/loss_guides.h"
 #include "fit/mean_strands.h"
+#include "fit/paper_guides.h"
 #include "fit/state.h"
 
 enum phase { SOLVE, ASSIGN, ENDED };
@@ -308,12 +312,29 @@ static void solution_finish(struct solution *solution, const struct groom_contex
     memory_release(allocator, solution->surface, size, sizeof *solution->surface);
 }
 
-/* Eq. 7 a vertex, square metres. */
-static double loss_of(const struct solution *solution, const struct groom_context *context)
+/* Solved shapes as points, where they are any. */
+static void fill_points(struct solution *solution)
 {
-    double metres = solution->fit->scale;
-    return metres * metres *
-           mean_strands_loss(&solution->mean, (const double (*)[3])solution->shape, solution->partial, context);
+    const struct groom_fit *fit = solution->fit;
+    for (uint32_t g = 0; g < fit->n_guides; g++) {
+        size_t at = (size_t)g * fit->m;
+        if (is_sane(solution, g))
+            points_of(solution, g, solution->point + at);
+        else
+            memcpy(solution->point + at, fit->groom->guides + at, fit->m * sizeof *solution->point);
+    }
+}
+
+/* The groom's guides for those in `point`, and back. */
+static void exchange_guides(struct solution *solution)
+{
+    const struct groom_fit *fit = solution->fit;
+    for (size_t v = 0; v < (size_t)fit->n_guides * fit->m; v++)
+        for (int c = 0; c < 3; c++) {
+            float kept = fit->groom->guides[v][c];
+            fit->groom->guides[v][c] = solution->point[v][c];
+            solution->point[v][c] = kept;
+        }
 }
 
 static groom_status solve_rounds(struct solution *solution, const struct groom_context *context, struct groom_diag *diag)
@@ -323,7 +344,6 @@ static groom_status solve_rounds(struct solution *solution, const struct groom_c
         guide_system_solve(&solution->system, solution->shape, TOLERANCE, MOST_ITERATIONS, context);
         if (progress_cancelled(context))
             return cancelled(diag);
-        progress_loss(context, "L_g", round + 1, loss_of(solution, context));
         if (!fit->bvh || round == ROUNDS_AT_HEAD || hold_out_of_head(solution, context) == 0)
             break;
     }
@@ -336,17 +356,21 @@ static groom_status solve_rounds(struct solution *solution, const struct groom_c
 static groom_status solve(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     struct solution solution;
+    double before, after;
     groom_status st = solution_init(&solution, fit, context, diag);
     if (st != GROOM_OK)
         goto out;
-    double before = loss_of(&solution, context);
-    progress_loss(context, "L_g", 0, before);
-    if ((st = solve_rounds(&solution, context, diag)) != GROOM_OK)
+    if ((st = loss_guides(fit, &before, context, diag)) != GROOM_OK ||
+        (st = solve_rounds(&solution, context, diag)) != GROOM_OK)
         goto out;
-    report_loss(&fit->report, "guides", "L_g", before, loss_of(&solution, context));
-    for (uint32_t g = 0; g < fit->n_guides; g++)
-        if (is_sane(&solution, g))
-            points_of(&solution, g, fit->groom->guides + (size_t)g * fit->m);
+    fill_points(&solution);
+    exchange_guides(&solution);
+    if ((st = loss_guides(fit, &after, context, diag)) != GROOM_OK) {
+        exchange_guides(&solution);
+        goto out;
+    }
+    report_progress(&fit->report, "guides", "L_g", before, 0, context);
+    report_progress(&fit->report, "guides", "L_g", after, 1, context);
     fit->phase = ASSIGN;
 out:
     solution_finish(&solution, context);
@@ -355,17 +379,41 @@ out:
 
 /* --- the stage -------------------------------------------------------------------------------------- */
 
+static int is_paper(const struct groom_fit *fit) { return fit->options.stages.guides.method == GROOM_FIT_PAPER; }
+
+static groom_status paper_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    int ended = 0;
+    groom_status st = paper_guides_step(fit, &ended, context, diag);
+    if (st == GROOM_OK && ended) {
+        fit->phase = ASSIGN;
+        fit->iteration = 0;
+    }
+    return st;
+}
+
 groom_status guides_step(struct groom_fit *fit, int *ended, const struct groom_context *context,
                          struct groom_diag *diag)
 {
+    if (fit->phase == SOLVE && is_paper(fit))
+        return paper_step(fit, context, diag);
     if (fit->phase == SOLVE)
         return solve(fit, context, diag);
     return assign_step(fit, ended, context, diag); /* strands have moved: ask again what is in the head */
 }
 
-double guides_fraction(const struct groom_fit *fit) { return 0.7 * fit->phase + 0.3 * fit->iteration / fit->n; }
+double guides_fraction(const struct groom_fit *fit)
+{
+    double solved = fit->iteration / fmax(fit->options.stages.guides.iterations, 1);
+    if (fit->phase == SOLVE)
+        return is_paper(fit) ? 0.7 * fmin(solved, 1) : 0;
+    return 0.7 + 0.3 * fit->iteration / fit->n;
+}
 
 int guides_sound(const struct groom_fit *fit)
 {
-    return fit->phase < ENDED && fit->iteration < fit->n && (fit->phase == ASSIGN || fit->iteration == 0);
+    if (fit->phase == SOLVE && is_paper(fit) && fit->iteration > 0)
+        return fit->iteration < fit->options.stages.guides.iterations && fit->n_moments == paper_guides_moments(fit);
+    return fit->phase < ENDED && fit->n_moments == 0 && fit->iteration < fit->n &&
+           (fit->phase == ASSIGN || fit->iteration == 0);
 }

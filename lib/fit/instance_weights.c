@@ -3,8 +3,10 @@
  * Each strand is blended from the guides near it with the weights that bring the clusters' mean
  * strands, not smoothed and without operators, closest to it (Eqs. 3 and 5). The paper takes 2 000
  * steps of Adam; for one strand it is a least-squares problem of a few weights, solved here at its
- * minimum (fit/weights.h), off the ways in which operators move strands, which it must leave to them. */
+ * minimum (fit/weights.h), off the ways in which operators move strands, which it must leave to them.
+ * method "paper" is the paper's own, as a reference (paper_weights.h). */
 #include "base/progress.h"
+#include "fit/paper_weights.h"
 #include "fit/state.h"
 #include "fit/weights.h"
 
@@ -34,7 +36,9 @@ static groom_status solve(struct groom_fit *fit, const struct groom_context *con
 {
     uint32_t count = fit->n - fit->iteration < STEP_STRANDS ? fit->n - fit->iteration : STEP_STRANDS;
     struct weights_loss loss = {0};
-    groom_status st = weights_solve(fit, fit->iteration, count, context, &loss, diag);
+    groom_status st = fit->options.stages.instance_weights.method == GROOM_FIT_PAPER
+                          ? paper_weights_solve(fit, fit->iteration, count, context, &loss, diag)
+                          : weights_solve(fit, fit->iteration, count, context, &loss, diag);
     if (st != GROOM_OK)
         return st;
     add_loss(fit, &loss);

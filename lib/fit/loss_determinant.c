@@ -80,6 +80,21 @@ double determinant_log(double *kernel, uint32_t n)
     return 2 * sum;
 }
 
+double determinant_log_inverse(double *kernel, uint32_t n, double *inverse)
+{
+    double value = determinant_log(kernel, n);
+    if (value == -INFINITY)
+        return value;
+    for (uint32_t a = 0; a < n; a++) { /* symmetric: column by column is row by row */
+        double *row = inverse + (size_t)a * n;
+        for (uint32_t b = 0; b < n; b++)
+            row[b] = a == b;
+        dense_forward(kernel, n, row);
+        dense_backward(kernel, n, row);
+    }
+    return value;
+}
+
 struct comparing {
     const float (*a)[3], (*b)[3];
     uint32_t n, m;
@@ -124,23 +139,31 @@ groom_status loss_determinant(const float (*a)[3], const float (*b)[3], uint32_t
 
 /* --- batches ---------------------------------------------------------------------------- */
 
-groom_status determinant_batches(const float (*root_uv)[2], uint32_t n_strands, uint32_t n_batches, uint32_t n,
-                                 struct groom_random_key key, const struct groom_context *context, uint32_t *strand,
-                                 struct groom_diag *diag)
+groom_status determinant_draw(const struct groom_neighbours *neighbours, const float (*root_uv)[2], uint32_t n_strands,
+                              uint32_t index, uint32_t n_batches, uint32_t n, struct groom_random_key key,
+                              const struct groom_context *context, uint32_t *strand, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
-    struct groom_neighbours *neighbours = NULL;
     float (*middle)[2] = memory_array(allocator, n_batches, sizeof *middle);
     groom_status st = middle ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for %u batches", n_batches);
-    if (st == GROOM_OK)
-        st = groom_neighbours_create(root_uv[0], n_strands, 2, context, &neighbours, diag);
     for (uint32_t i = 0; st == GROOM_OK && i < n_batches; i++) {
-        const float *uv = root_uv[groom_random_below(key, i, 0, n_strands)];
+        const float *uv = root_uv[groom_random_below(key, index + i, 0, n_strands)];
         middle[i][0] = uv[0], middle[i][1] = uv[1];
     }
     if (st == GROOM_OK)
         st = groom_neighbours_find(neighbours, middle[0], n_batches, n, strand, NULL, context, diag);
-    groom_neighbours_destroy(neighbours);
     memory_release(allocator, middle, n_batches, sizeof *middle);
+    return st;
+}
+
+groom_status determinant_batches(const float (*root_uv)[2], uint32_t n_strands, uint32_t n_batches, uint32_t n,
+                                 struct groom_random_key key, const struct groom_context *context, uint32_t *strand,
+                                 struct groom_diag *diag)
+{
+    struct groom_neighbours *neighbours = NULL;
+    groom_status st = groom_neighbours_create(root_uv[0], n_strands, 2, context, &neighbours, diag);
+    if (st == GROOM_OK)
+        st = determinant_draw(neighbours, root_uv, n_strands, 0, n_batches, n, key, context, strand, diag);
+    groom_neighbours_destroy(neighbours);
     return st;
 }

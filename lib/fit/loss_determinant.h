@@ -26,6 +26,9 @@ determinant_kernel determinant_clump_kernel;
  * ten times epsilon that is. -INFINITY for a kernel that is not finite. */
 double determinant_log(double *kernel, uint32_t n);
 
+/* The same, and (K + epsilon I)^-1 in full, for its slope. inverse [n][n]; not set where the answer is -INFINITY */
+double determinant_log_inverse(double *kernel, uint32_t n, double *inverse);
+
 /* The mean over batches of the squared difference of log-determinants (Eqs. 13, 18).
  * a, b     [n_batches][n][m][3]
  * returns  GROOM_OK, GROOM_ENOMEM
@@ -35,6 +38,8 @@ GROOM_MUST_CHECK groom_status loss_determinant(const float (*a)[3], const float 
                                                const struct groom_context *context, double *loss,
                                                struct groom_diag *diag);
 
+struct groom_neighbours;
+
 /* The batches of Section 5.5: strands drawn at random, each with those nearest to it on the scalp.
  * root_uv  [n_strands][2]
  * n        strands of a batch, at most n_strands
@@ -43,5 +48,10 @@ GROOM_MUST_CHECK groom_status determinant_batches(const float (*root_uv)[2], uin
                                                   uint32_t n, struct groom_random_key key,
                                                   const struct groom_context *context, uint32_t *strand,
                                                   struct groom_diag *diag);
+/* Likewise, where many are drawn: of an index of the roots that stays. index  of the first batch's random number */
+GROOM_MUST_CHECK groom_status determinant_draw(const struct groom_neighbours *neighbours, const float (*root_uv)[2],
+                                               uint32_t n_strands, uint32_t index, uint32_t n_batches, uint32_t n,
+                                               struct groom_random_key key, const struct groom_context *context,
+                                               uint32_t *strand, struct groom_diag *diag);
 
 #endif

@@ -6,7 +6,9 @@
  * common random numbers, they are moved until some 180 statistics of the strands agree with the target's
  * (moments.h), by their covariance. First the frequencies look around for a better valley, then Levenberg and
  * Marquardt's steps go down it. The statistics begin as coarse ones, of which the large differences decide,
- * and are taken more finely from step to step. The paper's losses, before and after, are the yardstick. */
+ * and are taken more finely from step to step. The paper's losses, before and after, are the yardstick.
+ *
+ * method "paper" is the paper's own, as a reference (paper_operators.h). */
 #include <math.h>
 #include <string.h>
 
@@ -14,8 +16,10 @@
 #include "base/progress.h"
 #include "fit/dense.h"
 #include "fit/gather.h"
+#include "fit/gradient_determinant.h"
 #include "fit/loss_determinant.h"
 #include "fit/matching.h"
+#include "fit/paper_operators.h"
 #include "groom/strands.h"
 #include "quality/loss_wasserstein.h"
 
@@ -336,19 +340,12 @@ static groom_status compare(const struct groom_fit *fit, const struct yardstick 
                             &losses->clump, diag);
 }
 
-static uint32_t batch_size(const struct groom_fit *fit)
-{
-    double n = fit->n * fit->options.stages.operators.batch_fraction;
-    n = fmin(fmax(n, 2), fit->options.stages.operators.batch_maximum);
-    return n < fit->n ? (uint32_t)n : fit->n;
-}
-
 static groom_status measure_losses(const struct groom_fit *fit, struct losses *losses,
                                    const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     struct yardstick y = {.n_shape = fit->n < LOSS_STRANDS ? fit->n : LOSS_STRANDS,
-                          .n_batches = fit->options.stages.operators.batches_late, .n_batch = batch_size(fit)};
+                          .n_batches = fit->options.stages.operators.batches_late, .n_batch = gradient_determinant_batch(fit)};
     y.n = y.n_shape + y.n_batches * y.n_batch;
     size_t n_points = (size_t)y.n * fit->m;
     groom_status st = GROOM_ENOMEM;
@@ -458,21 +455,37 @@ static groom_status match_step(struct groom_fit *fit, const struct groom_context
     return st;
 }
 
+static int is_paper(const struct groom_fit *fit) { return fit->options.stages.operators.method == GROOM_FIT_PAPER; }
+
+static groom_status paper_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    int ended = 0;
+    groom_status st = paper_operators_step(fit, &ended, context, diag);
+    if (st == GROOM_OK && ended) {
+        fit->phase = AFTER;
+        fit->iteration = 0;
+    }
+    return st;
+}
+
 groom_status operators_step(struct groom_fit *fit, int *ended, const struct groom_context *context,
                             struct groom_diag *diag)
 {
     groom_status st = GROOM_OK;
     switch ((enum phase)fit->phase) {
     case BEFORE:
-        if (count_unknowns(fit) == 0 || fit->options.stages.operators.refinements == 0)
+        if (is_paper(fit) ? paper_operators_iterations(fit) == 0
+                          : count_unknowns(fit) == 0 || fit->options.stages.operators.refinements == 0)
             fit->phase = ENDED;
-        else if ((st = report_losses(fit, 0, context, diag)) == GROOM_OK)
+        else if ((st = report_losses(fit, 0, context, diag)) == GROOM_OK && is_paper(fit))
+            fit->phase = REFINE;
+        else if (st == GROOM_OK)
             begin(fit);
         break;
     case SEARCH:
-    case REFINE: st = match_step(fit, context, diag); break;
+    case REFINE: st = is_paper(fit) ? paper_step(fit, context, diag) : match_step(fit, context, diag); break;
     case AFTER:
-        if ((st = report_losses(fit, 1, context, diag)) == GROOM_OK)
+        if ((st = report_losses(fit, is_paper(fit) ? fit->options.stages.operators.iterations : 1, context, diag)) == GROOM_OK)
             fit->phase = ENDED;
         break;
     case ENDED: break;
@@ -485,7 +498,8 @@ double operators_fraction(const struct groom_fit *fit)
 {
     uint32_t n = fit->groom ? count_unknowns(fit) : 0;
     double search = n ? (double)fit->iteration / n : 0;
-    double refined = (double)fit->iteration / fmax(fit->options.stages.operators.refinements, 1);
+    uint32_t steps = fit->groom && is_paper(fit) ? paper_operators_iterations(fit) : fit->options.stages.operators.refinements;
+    double refined = (double)fit->iteration / fmax(steps, 1);
     switch ((enum phase)fit->phase) {
     case BEFORE: return 0;
     case SEARCH: return 0.05 + 0.3 * search;
@@ -496,10 +510,20 @@ double operators_fraction(const struct groom_fit *fit)
     return 1;
 }
 
+static int sound_paper(const struct groom_fit *fit)
+{
+    int under_way = fit->phase == REFINE && fit->iteration > 0;
+    uint32_t limit = fit->phase == REFINE ? paper_operators_iterations(fit) : 1;
+    return (fit->phase == BEFORE || fit->phase == REFINE || fit->phase == AFTER) && fit->iteration < limit &&
+           fit->n_moments == (under_way ? paper_operators_moments(fit) : 0);
+}
+
 int operators_sound(const struct groom_fit *fit)
 {
     if (fit->groom->n_operators > GROOM_FIT_MAX_OPERATORS)
         return 0;
+    if (is_paper(fit))
+        return sound_paper(fit);
     switch ((enum phase)fit->phase) {
     case BEFORE:
     case AFTER: return 1;

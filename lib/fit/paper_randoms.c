@@ -81,7 +81,7 @@ static groom_status descend_some(struct groom_fit *fit, struct gradient_strands 
             st = groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage randoms");
         if (st != GROOM_OK)
             return st;
-        progress_loss(context, "L_19", fit->iteration + k, loss);
+        progress_loss(context, "L_rand", fit->iteration + k, loss);
         descend(fit, gradient, moments, fit->iteration + k);
     }
     return GROOM_OK;

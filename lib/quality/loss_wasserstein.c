@@ -8,10 +8,10 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "quality/sort.h"
+#include "quality/waves.h"
 
 #define DIRECTIONS_PER_PIECE 16
 #define STRANDS_PER_PIECE 256
-#define PI 3.14159265358979323846
 
 static uint32_t least(uint32_t a, uint32_t b) { return a < b ? a : b; }
 static uint32_t pieces_of(uint32_t n, uint32_t per_piece) { return n / per_piece + (n % per_piece != 0); }
@@ -27,15 +27,15 @@ struct slicing {
     double *sums;       /* [n_directions] */
 };
 
-static void draw_direction(const struct slicing *job, uint32_t index, float *direction)
+void loss_wasserstein_direction(struct groom_random_key key, uint32_t index, uint32_t d, float *direction)
 {
     double square = 0;
-    for (uint32_t i = 0; i < job->d; i++) {
-        direction[i] = (float)groom_random_normal(job->key, index, i);
+    for (uint32_t i = 0; i < d; i++) {
+        direction[i] = (float)groom_random_normal(key, index, i);
         square += (double)direction[i] * direction[i];
     }
     float scale = square > 0 ? (float)(1 / sqrt(square)) : 0;
-    for (uint32_t i = 0; i < job->d; i++)
+    for (uint32_t i = 0; i < d; i++)
         direction[i] *= scale;
 }
 
@@ -48,7 +48,7 @@ static void slice_piece(void *user, uint32_t piece, uint32_t thread)
     float *of_a = directions + (size_t)DIRECTIONS_PER_PIECE * job->d, *of_b = of_a + (size_t)DIRECTIONS_PER_PIECE * job->n;
     float *spare = of_b + (size_t)DIRECTIONS_PER_PIECE * job->n;
     for (uint32_t k = 0; k < count; k++)
-        draw_direction(job, first + k, directions + (size_t)k * job->d);
+        loss_wasserstein_direction(job->key, first + k, job->d, directions + (size_t)k * job->d);
     cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)count, n, d, 1, directions, d, job->a, d, 0, of_a, n);
     cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)count, n, d, 1, directions, d, job->b, d, 0, of_b, n);
     for (uint32_t k = 0; k < count; k++) {
@@ -98,18 +98,7 @@ struct transforming {
     float *scratch;              /* for each thread: [3 STRANDS_PER_PIECE][2 h] */
 };
 
-static uint32_t half_of(uint32_t m) { return (m - 1) / 2 + 1; }
-
-static void make_waves(uint32_t m, float *waves)
-{
-    uint32_t h = half_of(m), n = m - 1;
-    for (uint32_t k = 0; k < h; k++)
-        for (uint32_t j = 0; j < n; j++) {
-            double angle = 2 * PI * (double)((uint64_t)k * j % n) / n;
-            waves[(size_t)k * n + j] = (float)cos(angle);
-            waves[(size_t)(h + k) * n + j] = (float)sin(angle);
-        }
-}
+static uint32_t half_of(uint32_t m) { return waves_count(m - 1); }
 
 static void transform_piece(void *user, uint32_t piece, uint32_t thread)
 {
@@ -146,7 +135,7 @@ groom_status loss_shape_features(const float (*points)[3], uint32_t n, uint32_t 
     groom_status st = waves && job.scratch ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for spectra of %u strands", n);
     blas_prepare();
     if (st == GROOM_OK) {
-        make_waves(m, waves);
+        waves_fill(m - 1, half_of(m), waves);
         parallel_for(context, pieces_of(n, STRANDS_PER_PIECE), transform_piece, &job);
     }
     memory_release(allocator, waves, n_waves, sizeof *waves);

@@ -21,6 +21,9 @@ GROOM_MUST_CHECK groom_status loss_wasserstein(const float *a, const float *b, u
                                                const struct groom_context *context, double *loss,
                                                struct groom_diag *diag);
 
+/* The direction of Eq. 11 of this index: a unit vector [d]. */
+void loss_wasserstein_direction(struct groom_random_key key, uint32_t index, uint32_t d, float *direction);
+
 /* Eq. 12 and its two terms: total = spectra + lambda_e segments. */
 struct loss_shape {
     double spectra, segments, total;

@@ -31,3 +31,27 @@ void sort_floats(float *values, float *spare, uint32_t n)
         memcpy(&values[i], &bits, sizeof bits);
     }
 }
+
+/* One pass over the digit of the values' keys (the high 32 bits) that begins at `shift`. */
+static void order_pass(const uint64_t *from, uint64_t *to, uint32_t n, int shift)
+{
+    uint32_t first[2049] = {0};
+    for (uint32_t i = 0; i < n; i++)
+        first[(from[i] >> (32 + shift) & 2047) + 1]++;
+    for (int d = 0; d < 2048; d++)
+        first[d + 1] += first[d];
+    for (uint32_t i = 0; i < n; i++)
+        to[first[from[i] >> (32 + shift) & 2047]++] = from[i];
+}
+
+void sort_order(const float *values, uint64_t *order, uint64_t *spare, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t bits;
+        memcpy(&bits, &values[i], sizeof bits);
+        spare[i] = (uint64_t)key_of(bits) << 32 | i;
+    }
+    order_pass(spare, order, n, 0);
+    order_pass(order, spare, n, 11);
+    order_pass(spare, order, n, 22);
+}

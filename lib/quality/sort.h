@@ -9,4 +9,9 @@
  * spare   [n] scratch */
 void sort_floats(float *values, float *spare, uint32_t n);
 
+/* The order in which they stand ascending; equal ones by their place.
+ * values        [n] no NANs; left alone
+ * order, spare  [n] out: the low 32 bits are indices into values; scratch */
+void sort_order(const float *values, uint64_t *order, uint64_t *spare, uint32_t n);
+
 #endif

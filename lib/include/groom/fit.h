@@ -75,12 +75,14 @@ struct groom_fit_options {
             int estimate_operators;
         } initialize;
         struct {
+            groom_fit_method method;
             uint32_t candidates;        /* guides near a strand among which it chooses */
             double distance_pull;       /* towards the weights by distance */
             uint32_t iterations;        /* Section 6: 2000 */
             double learning_rate;       /* 30 */
         } instance_weights;
         struct {
+            groom_fit_method method;
             uint32_t iterations;        /* 3000 */
             double learning_rate_curvature, learning_rate_length, learning_rate_angle;
             double lambda, sigma_d, sigma_phi; /* gradient filter: 10, 0.3, 0.4 */
@@ -88,6 +90,7 @@ struct groom_fit_options {
             double across;  /* pull of neighbours on the scalp, over that of a guide's strands, or GROOM_FIT_AUTO */
         } guides;
         struct {
+            groom_fit_method method;
             uint32_t pairs;             /* of neighbouring strands, of which statistics are matched */
             uint32_t refinements;       /* steps at most; 0 leaves the operators as they are */
             uint32_t iterations;        /* of each loss: 3000 */
@@ -173,6 +176,27 @@ const char *groom_fit_stage_name(uint32_t index);
 /* What was lost or chosen on the way, for the report with the groom. */
 #define GROOM_FIT_MAX_NOTES 16
 #define GROOM_FIT_MAX_LOSSES 32
+/* A loss of a stage, before and after it. With lengths in units of 10 cm on a head of ordinary size (scaled with
+ * the head: what the paper's weights fit) where it does not say metres, by stage and name:
+ *   initialize        cluster    mean square distance of a vertex from its cluster's mean strand, square metres
+ *                     medoids    mean distance of guides from their operator guides, a vertex, metres
+ *   instance_weights  L_x        Eq. 5, square metres, of unsmoothed mean strands without operators
+ *   guides            L_g        Eq. 7 over the number of vertices, square metres: of the expectation, in which clump
+ *                                alone takes part, from the one strand that there is
+ *   operators         spectra    Eq. 11 of magnitudes of the segments' transforms, over the number of strands
+ *                     segments   Eq. 11 of the segments, over the number of strands
+ *                     shape      Eq. 12: spectra + lambda_e segments
+ *                     scale      Eqs. 13-15, 18: mean over batches_late batches
+ *                     clump      Eqs. 13, 16-18, likewise
+ *                     misfit     what method direct brings down instead: squared differences of statistics over their
+ *                                scatter (no equation of the paper)
+ *   randoms           L_rand     Eq. 19: spectra + lambda_d direction + lambda_l length
+ *                     spectra    its first term: of unit directions, summed over waves and coordinates
+ *                     direction  its second: 1 - the mean over segments of their products
+ *                     length     its third
+ *                     vertex     mean distance of vertices, metres (no part of Eq. 19)
+ * Transforms are one-sided and not normalised. The shape losses look at 1 500 strands at most, those of randoms
+ * at 4 000. Losses that are streamed have the same names; method paper streams those of its own steps. */
 struct groom_fit_loss {
     char stage[24], name[24];
     double before, after;
