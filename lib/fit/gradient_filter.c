@@ -113,7 +113,9 @@ groom_status gradient_filter(const float (*uv)[2], const float (*direction)[3], 
     size_t n_scratch = (size_t)4 * n * parallel_threads(context), n_splats = (size_t)2 * n * DIRECTIONS;
     struct smoothing job = {.lambda = widths.lambda, .n = n, .out = filter};
     struct groom_triangulation *triangulation = NULL;
-    groom_status st = groom_triangulation_create(uv, n, context, &triangulation, diag);
+    groom_status st = blas_prepare(context, diag); /* for those who apply it */
+    if (st == GROOM_OK)
+        st = groom_triangulation_create(uv, n, context, &triangulation, diag);
     if (st != GROOM_OK)
         return st;
     float *says = memory_array(allocator, n_splats, sizeof *says), *listens;
@@ -154,6 +156,5 @@ void gradient_filter_apply(const float *filter, const float *rows, uint32_t n, u
                            const struct groom_context *context)
 {
     struct applying job = {filter, rows, n, width, out};
-    blas_prepare();
     parallel_for(context, width / COLUMNS_PER_PIECE + (width % COLUMNS_PER_PIECE != 0), apply_columns, &job);
 }

@@ -221,8 +221,8 @@ groom_status gradient_shape_create(const struct groom_fit *fit, const struct gro
     g->sums = memory_array(allocator, d, sizeof *g->sums);
     g->points = memory_array(allocator, (size_t)g->n * g->m, sizeof *g->points);
     if (fine && g->waves && g->directions && g->push && g->sums && g->points) {
-        blas_prepare();
-        st = measure_target(g, context, diag);
+        if ((st = blas_prepare(context, diag)) == GROOM_OK)
+            st = measure_target(g, context, diag);
     }
     if (st != GROOM_OK) {
         gradient_shape_destroy(g);

@@ -170,9 +170,10 @@ static groom_status measure_target(struct gradient_strands *g, const struct groo
     struct measuring job = {.g = g, .per_thread = (size_t)6 * g->n_waves + g->n_segments};
     size_t n_scratch = job.per_thread * parallel_threads(context);
     job.scratch = memory_array(g->allocator, n_scratch, sizeof *job.scratch);
-    if (!job.scratch)
+    if (!job.scratch || blas_prepare(context, NULL) != GROOM_OK) {
+        memory_release(g->allocator, job.scratch, n_scratch, sizeof *job.scratch);
         return GROOM_ENOMEM;
-    blas_prepare();
+    }
     waves_fill(g->n_segments, g->n_waves, g->waves);
     parallel_for(context, g->n_pieces, measure_piece, &job);
     memory_release(g->allocator, job.scratch, n_scratch, sizeof *job.scratch);

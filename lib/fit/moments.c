@@ -464,7 +464,8 @@ groom_status moments_covariance(float *values, uint32_t n_pairs, const uint32_t 
         st = groom_fail(diag, GROOM_ENOMEM, "no memory for the covariance of %d statistics", n);
         goto out;
     }
-    blas_prepare();
+    if ((st = blas_prepare(context, diag)) != GROOM_OK)
+        goto out;
     standardize(values, n_pairs, bundle, n_bundles, mean, sums, variance);
     cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, n, n, (int)n_pairs, 1, values, n, values, n, 0, correlation, n);
     for (int f = 0; f < n; f++)

@@ -193,7 +193,8 @@ groom_status kmeans_iterate(const float *x, uint32_t n, uint32_t d, uint32_t k, 
     groom_status st = GROOM_OK;
 
     atomic_init(&l.cancelled, 0);
-    blas_prepare();
+    if ((st = blas_prepare(context, diag)) != GROOM_OK)
+        return st;
     if (!allocate(&l, allocator, n_threads)) {
         st = groom_fail(diag, GROOM_ENOMEM, "no memory for an iteration of K-means, %u rows, %u clusters", n, k);
         goto out;

@@ -70,12 +70,14 @@ groom_status loss_wasserstein(const float *a, const float *b, uint32_t n, uint32
     struct slicing job = {.a = a, .b = b, .n = n, .d = d, .n_directions = n_directions ? n_directions : d, .key = key};
     size_t n_scratch;
     double sum = 0;
-    blas_prepare();
+    groom_status st = blas_prepare(context, diag);
+    if (st != GROOM_OK)
+        return st;
     job.per_thread = (size_t)DIRECTIONS_PER_PIECE * (d + 2 * (size_t)n) + n;
     n_scratch = job.per_thread * parallel_threads(context);
     job.scratch = memory_array(allocator, n_scratch, sizeof *job.scratch);
     job.sums = memory_array(allocator, job.n_directions, sizeof *job.sums);
-    groom_status st = job.scratch && job.sums ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to compare %u strands", n);
+    st = job.scratch && job.sums ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to compare %u strands", n);
     if (st == GROOM_OK) {
         parallel_for(context, pieces_of(job.n_directions, DIRECTIONS_PER_PIECE), slice_piece, &job);
         for (uint32_t k = 0; k < job.n_directions; k++)
@@ -133,7 +135,8 @@ groom_status loss_shape_features(const float (*points)[3], uint32_t n, uint32_t 
                                .magnitudes = magnitudes};
     job.scratch = memory_array(allocator, n_scratch, sizeof *job.scratch);
     groom_status st = waves && job.scratch ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for spectra of %u strands", n);
-    blas_prepare();
+    if (st == GROOM_OK)
+        st = blas_prepare(context, diag);
     if (st == GROOM_OK) {
         waves_fill(m - 1, half_of(m), waves);
         parallel_for(context, pieces_of(n, STRANDS_PER_PIECE), transform_piece, &job);

@@ -2,7 +2,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 
+#include "base/blas.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "groom/random.h"
@@ -41,6 +43,31 @@ static void count_piece(void *user, uint32_t piece, uint32_t thread)
     (void)thread;
     ((uint32_t *)user)[piece]++;
 }
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) /* which reserve all the address space there is */
+static void limit_memory(rlim_t bytes)
+{
+    struct rlimit limit = {bytes, RLIM_INFINITY};
+    ck_assert_int_eq(setrlimit(RLIMIT_AS, &limit), 0);
+}
+
+/* OpenBLAS itself would not say so: it looks for memory until it is killed. */
+START_TEST(matrix_products_without_memory_are_refused)
+{
+    struct groom_pool *pool;
+    ck_ok(groom_pool_create(2, &pool));
+    struct groom_context context = {.pool = pool};
+    limit_memory(256u << 20);
+    ck_status(blas_prepare(&context, NULL), GROOM_ENOMEM);
+    limit_memory(RLIM_INFINITY);
+    ck_ok(blas_prepare(&context, NULL));
+    limit_memory(256u << 20); /* what it has taken it keeps */
+    ck_ok(blas_prepare(&context, NULL));
+    limit_memory(RLIM_INFINITY);
+    groom_pool_destroy(pool);
+}
+END_TEST
+#endif
 
 START_TEST(parallel_for_visits_each_piece_once)
 {
@@ -127,6 +154,10 @@ START_TEST(random_numbers_have_their_moments)
 END_TEST
 
 TEST_SUITE("base", every_status_has_a_name_and_a_message, fail_fills_the_diag_and_returns_the_status,
-           array_refuses_what_overflows, parallel_for_visits_each_piece_once,
+           array_refuses_what_overflows,
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+           matrix_products_without_memory_are_refused,
+#endif
+           parallel_for_visits_each_piece_once,
            a_loop_inside_a_loop_runs_in_its_thread, random_block_depends_on_each_of_its_inputs,
            random_numbers_have_their_moments)
