@@ -27,7 +27,7 @@ struct config {
     char webhook_url[CONFIG_TEXT_SIZE], webhook_secret[CONFIG_TEXT_SIZE];
     char webhook_allow[CONFIG_TEXT_SIZE]; /* addresses and networks, blanks between */
     /* counts, bytes, seconds */
-    uint64_t workers, worker_threads, worker_memory, job_time_s, job_attempts;
+    uint64_t workers, worker_threads, worker_memory, job_time_s, job_wall_s, job_attempts;
     uint64_t token_requests, token_bytes, token_queued, max_queue, session_time_s;
     uint64_t max_upload, upload_expiry_s, max_body, min_free, export_cache;
     uint64_t http_threads, fast_threads, slow_threads, slow_queue;

@@ -41,7 +41,7 @@ struct daemon {
     struct config config;
     int lock_fd;
     char worker[PATH_SIZE], temporary[PATH_SIZE], logs[PATH_SIZE], node_logs[PATH_SIZE], threads[48];
-    const char *worker_argv[4], *worker_env[2];
+    const char *worker_argv[4], *worker_env[3];
     struct listening listening;
     struct access *access;
     struct blobs *blobs;
@@ -166,6 +166,8 @@ static groom_status create_launcher(struct daemon *daemon, struct groom_diag *di
     const struct config *config = &daemon->config;
     daemon->worker_argv[0] = daemon->worker;
     daemon->worker_argv[1] = "attempt";
+    /* libgroom multiplies in threads of its own; OpenBLAS's would each take 128 MiB of the job's address space */
+    daemon->worker_env[1] = "OPENBLAS_NUM_THREADS=1";
     if (!strcmp(config->launcher, "local")) {
         choose_threads(daemon);
         return launch_local_create(&daemon->launcher, diag);
@@ -251,9 +253,10 @@ static groom_status start_supervisor(struct daemon *daemon, struct groom_diag *d
         .work_url = config->work_url[0] ? config->work_url : daemon->listening.url,
         .log_folder = daemon->logs,
         .limits = {.memory_bytes = config->worker_memory, .cpu_s = config->job_time_s},
+        .wall_s = (uint32_t)config->job_wall_s,
         .size = {.threads = (uint32_t)config->worker_threads,
                  .memory_bytes = config->worker_memory,
-                 .wall_s = config->job_time_s}};
+                 .wall_s = config->job_wall_s ? config->job_wall_s : config->job_time_s}};
     return supervisor_start(daemon->jobs, &options, &daemon->supervisor, diag);
 }
 

@@ -12,6 +12,7 @@
 #include "proto/embed.h"
 #include "server/http/handlers.h"
 #include "server/http/server.h"
+#include "server/jobs/stage_clock.h"
 #include "server/jobs/supervisor.h"
 
 EMBED(openapi_json, "proto/openapi.json");
@@ -141,27 +142,47 @@ static void add_process(struct lines *lines, struct server *server)
         (double)usage.ru_maxrss * 1024);
 }
 
-static const char *route_name(const void *user, size_t route, char *text, size_t capacity)
+static const char *route_name(size_t route, char *text, size_t capacity)
 {
-    (void)user;
     if (route >= http_n_routes)
         return "none";
     snprintf(text, capacity, "%s %s", http_routes[route].method, http_routes[route].pattern);
     return text;
 }
 
+static void print_stages(FILE *out, struct stage_clock *clock)
+{
+    static const char name[] = "groomd_stage_seconds";
+    const struct stage_times *times;
+    char labels[2 * STAGE_NAME_SIZE + 24];
+    metrics_head(out, name, "histogram", "Time that stages of jobs took, those that were gone through to their end.");
+    for (size_t i = 0; (times = stage_clock_times(clock, i)); i++) {
+        snprintf(labels, sizeof labels, "kind=\"%s\",stage=\"%s\"", times->kind, times->stage);
+        metrics_histogram(out, name, labels, &times->histogram, &stage_clock_bounds);
+    }
+}
+
 void about_metrics(struct request *request)
 {
     struct lines lines = {.n = 0};
     struct store_counts counts;
+    char *text = NULL;
+    size_t n_bytes = 0;
     if (store_count(request->service->store, &counts, NULL) == GROOM_OK)
         add_jobs(&lines, &counts);
     if (request->service->supervisor)
         add_workers(&lines, request->service->supervisor);
     add_process(&lines, request->server);
-    char *text = metrics_print(server_metrics(request->server), route_name, NULL, lines.line, lines.n);
-    if (text)
-        respond_bytes(request, 200, "text/plain; version=0.0.4; charset=utf-8", text, strlen(text));
-    else
+    FILE *out = open_memstream(&text, &n_bytes);
+    if (out) {
+        metrics_print(server_metrics(request->server), out, route_name);
+        metrics_lines(out, lines.line, lines.n);
+        print_stages(out, jobs_stage_clock(request->service->jobs));
+    }
+    if (out && fclose(out) == 0) {
+        respond_bytes(request, 200, "text/plain; version=0.0.4; charset=utf-8", text, n_bytes);
+    } else {
+        free(text);
         respond_failure(request, GROOM_ENOMEM, NULL);
+    }
 }

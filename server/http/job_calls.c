@@ -17,6 +17,7 @@ void jobs_respond(struct request *request, int status, const struct store_job *j
 {
     respond_json(request, status, jobs_json(job));
     respond_header(request, "Location", "/v1/jobs/%s", job->id);
+    memcpy(request->job_id, job->id, sizeof request->job_id);
 }
 
 void jobs_charge(struct request *request, struct jobs_request *submission)

@@ -1,17 +1,15 @@
 #include "server/http/metrics.h"
 
 #include <stdatomic.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const double bounds[] = {0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 60};
-#define N_BOUNDS (sizeof bounds / sizeof bounds[0])
+static const struct histogram_bounds bounds = {
+    14, {0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 60}};
 
 struct row {
-    atomic_ullong by_class[6];          /* of 1xx..5xx */
-    atomic_ullong bucket[N_BOUNDS + 1]; /* not cumulative here */
-    atomic_ullong microseconds;
+    atomic_ullong by_class[6]; /* of 1xx..5xx */
+    struct histogram latency;
 };
 
 struct metrics {
@@ -35,12 +33,8 @@ void metrics_request(struct metrics *metrics, size_t route, int status, double s
                      uint64_t n_sent)
 {
     struct row *row = &metrics->rows[route < metrics->n_rows ? route : metrics->n_rows - 1];
-    size_t bucket = 0;
-    while (bucket < N_BOUNDS && seconds > bounds[bucket])
-        bucket++;
     atomic_fetch_add(&row->by_class[status >= 100 && status < 600 ? status / 100 : 5], 1);
-    atomic_fetch_add(&row->bucket[bucket], 1);
-    atomic_fetch_add(&row->microseconds, (unsigned long long)(seconds * 1e6));
+    histogram_add(&row->latency, &bounds, seconds);
     atomic_fetch_add(&metrics->received, n_received);
     atomic_fetch_add(&metrics->sent, n_sent);
 }
@@ -56,20 +50,6 @@ static void print_counts(FILE *out, struct row *row, const char *name)
     }
 }
 
-static void print_latency(FILE *out, struct row *row, const char *name)
-{
-    unsigned long long n = 0;
-    for (size_t i = 0; i < N_BOUNDS; i++) {
-        n += atomic_load(&row->bucket[i]);
-        fprintf(out, "groomd_http_request_seconds_bucket{route=\"%s\",le=\"%g\"} %llu\n", name, bounds[i], n);
-    }
-    n += atomic_load(&row->bucket[N_BOUNDS]);
-    fprintf(out, "groomd_http_request_seconds_bucket{route=\"%s\",le=\"+Inf\"} %llu\n", name, n);
-    fprintf(out, "groomd_http_request_seconds_sum{route=\"%s\"} %.6f\n", name,
-            (double)atomic_load(&row->microseconds) * 1e-6);
-    fprintf(out, "groomd_http_request_seconds_count{route=\"%s\"} %llu\n", name, n);
-}
-
 static int was_used(struct row *row)
 {
     for (int class = 1; class < 6; class ++)
@@ -78,37 +58,50 @@ static int was_used(struct row *row)
     return 0;
 }
 
-static void head(FILE *out, const char *name, const char *type, const char *help)
+/* --- as text --------------------------------------------------------------------------------- */
+
+void metrics_head(FILE *out, const char *name, const char *type, const char *help)
 {
     fprintf(out, "# HELP %s %s\n# TYPE %s %s\n", name, help, name, type);
 }
 
-static void print_lines(FILE *out, const struct metrics_line *lines, size_t n)
+void metrics_lines(FILE *out, const struct metrics_line *lines, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
         if (i == 0 || strcmp(lines[i].name, lines[i - 1].name))
-            head(out, lines[i].name, lines[i].type, lines[i].help);
+            metrics_head(out, lines[i].name, lines[i].type, lines[i].help);
         fprintf(out, "%s%s%s%s %.15g\n", lines[i].name, lines[i].labels[0] ? "{" : "", lines[i].labels,
                 lines[i].labels[0] ? "}" : "", lines[i].value);
     }
 }
 
-char *metrics_print(struct metrics *metrics, const char *(*name_of)(const void *, size_t, char *, size_t),
-                    const void *user, const struct metrics_line *lines, size_t n_lines)
+void metrics_histogram(FILE *out, const char *name, const char *labels, const struct histogram *histogram,
+                       const struct histogram_bounds *limits)
 {
-    char *text = NULL, name[128];
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
-    if (!out)
-        return NULL;
-    head(out, "groomd_http_requests_total", "counter", "Requests answered, by route and status class.");
+    unsigned long long n = 0;
+    for (size_t i = 0; i < limits->n; i++) {
+        n += atomic_load(&histogram->bucket[i]);
+        fprintf(out, "%s_bucket{%s,le=\"%g\"} %llu\n", name, labels, limits->seconds[i], n);
+    }
+    n += atomic_load(&histogram->bucket[limits->n]);
+    fprintf(out, "%s_bucket{%s,le=\"+Inf\"} %llu\n", name, labels, n);
+    fprintf(out, "%s_sum{%s} %.6f\n", name, labels, (double)atomic_load(&histogram->microseconds) * 1e-6);
+    fprintf(out, "%s_count{%s} %llu\n", name, labels, n);
+}
+
+void metrics_print(struct metrics *metrics, FILE *out, const char *(*name_of)(size_t, char *, size_t))
+{
+    char name[128], labels[160];
+    metrics_head(out, "groomd_http_requests_total", "counter", "Requests answered, by route and status class.");
     for (size_t i = 0; i < metrics->n_rows; i++)
-        print_counts(out, &metrics->rows[i], name_of(user, i, name, sizeof name));
-    head(out, "groomd_http_request_seconds", "histogram",
-         "Time from the head of a request to the end of its answer.");
-    for (size_t i = 0; i < metrics->n_rows; i++)
-        if (was_used(&metrics->rows[i]))
-            print_latency(out, &metrics->rows[i], name_of(user, i, name, sizeof name));
+        print_counts(out, &metrics->rows[i], name_of(i, name, sizeof name));
+    metrics_head(out, "groomd_http_request_seconds", "histogram", "Time from the head of a request to the end of its answer.");
+    for (size_t i = 0; i < metrics->n_rows; i++) {
+        if (!was_used(&metrics->rows[i]))
+            continue;
+        snprintf(labels, sizeof labels, "route=\"%s\"", name_of(i, name, sizeof name));
+        metrics_histogram(out, "groomd_http_request_seconds", labels, &metrics->rows[i].latency, &bounds);
+    }
     const struct metrics_line own[] = {
         {"groomd_http_received_bytes_total", "", "Bytes of request bodies.", "counter",
          (double)atomic_load(&metrics->received)},
@@ -117,7 +110,5 @@ char *metrics_print(struct metrics *metrics, const char *(*name_of)(const void *
         {"groomd_http_event_streams", "", "Open event streams.", "gauge",
          (double)atomic_load(&metrics->streams)},
     };
-    print_lines(out, own, sizeof own / sizeof own[0]);
-    print_lines(out, lines, n_lines);
-    return fclose(out) == 0 ? text : (free(text), NULL);
+    metrics_lines(out, own, sizeof own / sizeof own[0]);
 }

@@ -5,6 +5,9 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
+
+#include "server/histogram.h"
 
 struct metrics;
 
@@ -16,15 +19,20 @@ void metrics_request(struct metrics *metrics, size_t route, int status, double s
                      uint64_t n_sent);
 void metrics_stream(struct metrics *metrics, int change); /* event streams: +1, -1 */
 
-/* Gauges and counters from elsewhere that are printed beside. */
+/* The counters of the HTTP side. name_of(i) labels route i ("GET /v1/jobs/{id}"). */
+void metrics_print(struct metrics *metrics, FILE *out, const char *(*name_of)(size_t route, char *text, size_t capacity));
+
+/* --- figures from elsewhere, printed beside ------------------------------------------------- */
+
 struct metrics_line {
     const char *name, *labels, *help, *type; /* labels: `state="queued"` or "" */
     double value;
 };
-
-/* name_of(user, i) labels route i ("GET /v1/jobs/{id}"). *text is malloc'ed; NULL: out of memory. */
-char *metrics_print(struct metrics *metrics,
-                    const char *(*name_of)(const void *user, size_t route, char *text, size_t capacity),
-                    const void *user, const struct metrics_line *lines, size_t n_lines);
+void metrics_lines(FILE *out, const struct metrics_line *lines, size_t n);
+/* Before the first line of a name. */
+void metrics_head(FILE *out, const char *name, const char *type, const char *help);
+/* labels: at least one. */
+void metrics_histogram(FILE *out, const char *name, const char *labels, const struct histogram *histogram,
+                       const struct histogram_bounds *bounds);
 
 #endif

@@ -76,6 +76,7 @@ struct request {
     unsigned scopes;    /* of enum access_scope */
     struct access_limits limits;
     struct store_attempt_ref attempt; /* ROUTE_WORK: the attempt that is asking */
+    char job_id[STORE_ID_SIZE]; /* the job that it is about, for the log; "" */
     struct response response;
 
     /* the server's */

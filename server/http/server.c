@@ -216,6 +216,8 @@ static bool find_route(struct request *request)
     case ROUTER_FOUND:
         request->route = match.route;
         memcpy(request->parameter, match.parameter, sizeof request->parameter);
+        if (!strncmp(match.route->pattern, "/v1/jobs/{id}", 13))
+            snprintf(request->job_id, sizeof request->job_id, "%s", request->parameter[0]);
         return true;
     case ROUTER_NO_METHOD:
         if (!strcmp(request->method, "OPTIONS"))
@@ -443,6 +445,7 @@ static void become_attempt(struct request *request)
     struct actor *actor = &request->actor;
     snprintf(actor->token, sizeof actor->token, "%.40s.%u", request->attempt.job_id, request->attempt.number);
     snprintf(actor->name, sizeof actor->name, "attempt");
+    memcpy(request->job_id, request->attempt.job_id, sizeof request->job_id);
     request->scopes = ACCESS_WORK;
 }
 
@@ -667,7 +670,7 @@ static void remote_of(struct request *request, char *text, size_t capacity)
 
 static void write_access_log(struct request *request, double seconds, enum MHD_RequestTerminationCode code)
 {
-    char members[1100], path[400], remote[64];
+    char members[1400], path[400], remote[64], job[120] = "", id[80];
     int status = request->response.status;
     bool quiet = request->route && (request->route->flags & ROUTE_QUIET);
     enum config_log_level level = status >= 500 ? CONFIG_LOG_WARNING
@@ -676,12 +679,14 @@ static void write_access_log(struct request *request, double seconds, enum MHD_R
     if (!log_wants(level))
         return;
     remote_of(request, remote, sizeof remote);
+    if (request->job_id[0])
+        snprintf(job, sizeof job, ",\"job\":\"%s\"", log_escape(request->job_id, id, sizeof id));
     snprintf(members, sizeof members,
              "\"request\":\"%s\",\"method\":\"%s\",\"path\":\"%s\",\"status\":%d,\"seconds\":%.6f,"
-             "\"received\":%llu,\"sent\":%llu,\"remote\":\"%s\",\"token\":\"%s\",\"project\":\"%s\"%s",
+             "\"received\":%llu,\"sent\":%llu,\"remote\":\"%s\",\"token\":\"%s\",\"project\":\"%s\"%s%s",
              request->id, request->method, log_escape(request->path, path, sizeof path), status, seconds,
              (unsigned long long)request->n_received, (unsigned long long)request->n_sent, remote,
-             request->actor.token, request->actor.project,
+             request->actor.token, request->actor.project, job,
              code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? "" : ",\"broken\":true");
     log_members(level, "request", members);
 }

@@ -6,12 +6,15 @@
 
 #include "server/jobs/queue.h"
 #include "server/jobs/work.h"
+#include "server/log.h"
 
 groom_status jobs_create(struct store *store, struct blobs *blobs, struct jobs **jobs, struct groom_diag *diag)
 {
     struct jobs *made = calloc(1, sizeof *made);
-    if (!made)
+    if (!made || !(made->clock = stage_clock_create())) {
+        free(made);
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the queue");
+    }
     made->store = store;
     made->blobs = blobs;
     pthread_mutex_init(&made->lock, NULL);
@@ -24,8 +27,11 @@ void jobs_destroy(struct jobs *jobs)
     if (!jobs)
         return;
     pthread_mutex_destroy(&jobs->lock);
+    stage_clock_destroy(jobs->clock);
     free(jobs);
 }
+
+struct stage_clock *jobs_stage_clock(struct jobs *jobs) { return jobs->clock; }
 
 void jobs_share_blobs(struct jobs *jobs, const char *folder)
 {
@@ -140,12 +146,26 @@ groom_status jobs_collect_blobs(struct jobs *jobs, uint64_t *n_removed, struct g
     return blobs_collect_all(jobs->blobs, is_referenced, jobs->store, n_removed, diag);
 }
 
+/* Every change of a state; of an attempt that ended by itself also the first line of its last words. */
+static void log_move(const struct store_job_move *move)
+{
+    char words[400], line[200] = "";
+    if (move->last_words)
+        snprintf(line, sizeof line, "%.*s", (int)strcspn(move->last_words, "\n"), move->last_words);
+    log_job(CONFIG_LOG_INFO, "job", move->job_id, move->attempt, "\"state\":\"%s\"%s%s%s%s%s%s", store_job_state_name(move->to),
+            move->attempt ? ",\"attempt_state\":\"" : "", move->attempt ? store_attempt_state_name(move->attempt_state) : "",
+            move->attempt ? "\"" : "", line[0] ? ",\"last_words\":\"" : "", log_escape(line, words, sizeof words),
+            line[0] ? "\"" : "");
+}
+
 groom_status jobs_move(struct jobs *jobs, const struct store_job_move *move, struct groom_diag *diag)
 {
     char garbage[STORE_HASH_SIZE] = "";
     groom_status status = store_job_move(jobs->store, move, garbage, diag);
     if (status != GROOM_OK)
         return status;
+    log_move(move);
+    stage_clock_leave(jobs->clock, move->job_id, move->to == STORE_JOB_SUCCEEDED);
     jobs_drop_blob(jobs, garbage);
     jobs_notify(jobs, move->job_id);
     jobs_nudge(jobs);
@@ -183,6 +203,7 @@ groom_status jobs_submit(struct jobs *jobs, const struct jobs_request *request, 
         return groom_fail(diag, status, "a job could not be made");
     if ((status = store_job_create(jobs->store, &row, diag)) != GROOM_OK)
         return status;
+    log_job(CONFIG_LOG_INFO, "job", id, 0, "\"state\":\"queued\",\"kind\":\"%.20s\"", request->kind);
     jobs_nudge(jobs);
     return store_job_get(jobs->store, id, job, diag);
 }

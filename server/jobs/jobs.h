@@ -72,7 +72,8 @@ GROOM_MUST_CHECK groom_status jobs_watch(struct jobs *jobs, const char *id, jobs
                                          struct jobs_watch **watch);
 /* When this returns the waker is not running and never will again. Takes NULL. */
 void jobs_unwatch(struct jobs *jobs, struct jobs_watch *watch);
-/* How many are watching, for /metrics. */
+/* How long stages take, and how many are watching, for /metrics. */
+struct stage_clock *jobs_stage_clock(struct jobs *jobs);
 size_t jobs_watching(struct jobs *jobs);
 /* Wake everybody: for the daemon's end, so that suspended connections can be closed. */
 void jobs_wake_all(struct jobs *jobs);

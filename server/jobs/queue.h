@@ -5,6 +5,7 @@
 #include <pthread.h>
 
 #include "server/jobs/jobs.h"
+#include "server/jobs/stage_clock.h"
 
 struct jobs_watch {
     char job_id[STORE_ID_SIZE];
@@ -16,6 +17,7 @@ struct jobs_watch {
 struct jobs {
     struct store *store;
     struct blobs *blobs;
+    struct stage_clock *clock;
     struct store_webhook_new webhook; /* url NULL: none */
     char shared_blobs[1024];      /* where workers see the folder of blobs; "": they do not */
     pthread_mutex_t lock;         /* of what follows; never held while the store is asked */

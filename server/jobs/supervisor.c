@@ -18,6 +18,7 @@
 #include "server/jobs/queue.h"
 #include "server/jobs/size.h"
 #include "server/jobs/work.h"
+#include "server/log.h"
 
 #define TAIL_BYTES 2048      /* of a log, as last words */
 #define RETRY_MS 500         /* where the store failed */
@@ -35,6 +36,8 @@ struct slot {
     int64_t stop_ms;         /* when the next step of stopping is due */
     bool adopted;            /* a former daemon launched it */
     bool drained;            /* it was stopped by us, not by itself */
+    bool over_time;          /* it has taken more than it may */
+    int64_t late_ms;         /* when it has; 0: never */
     bool ended;              /* the process has; what is left is to say so */
     char words[LAUNCH_HANDLE_SIZE + 384]; /* how it ended */
     int64_t retry_ms;
@@ -63,9 +66,15 @@ static int64_t now_ms(void)
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
-static void complain(const char *what, const struct groom_diag *diag)
+/* slot NULL: it is about no job. */
+static void complain(const struct slot *slot, const char *what, const struct groom_diag *diag)
 {
-    fprintf(stderr, "groomd: %s: %s\n", what, diag->detail);
+    char words[600];
+    if (slot)
+        log_job(CONFIG_LOG_ERROR, what, slot->ref.job_id, slot->ref.number, "\"error\":\"%s\"",
+                log_escape(diag->detail, words, sizeof words));
+    else
+        log_message(CONFIG_LOG_ERROR, "%s: %s", what, diag->detail);
 }
 
 static void count(struct supervisor *s, int running, uint64_t launched, uint64_t died)
@@ -153,17 +162,30 @@ static cJSON *describe_attempts(struct supervisor *s, const char *job_id)
     return array;
 }
 
-/* The error of a job that too many attempts have died of. Text of cJSON's, or NULL. */
-static char *describe_death(struct supervisor *s, const struct store_job *job, const char *words)
+/* Which limit it was that an attempt has gone over. */
+static void describe_limit(const struct supervisor *s, const struct slot *slot, struct problem *problem)
+{
+    bool by_the_clock = slot->late_ms > 0 && now_ms() >= slot->late_ms;
+    problem_set(problem, 500, "time-limit", "the job has taken more time than it may",
+                "attempt %u has used up its %llu s of %s (%s): give the job less to do, or ask for a larger limit",
+                slot->ref.number, by_the_clock ? (unsigned long long)s->options.wall_s : (unsigned long long)s->options.limits.cpu_s,
+                by_the_clock ? "time" : "processor time", by_the_clock ? "--job-wall" : "--job-time");
+}
+
+/* The error of a job that too many attempts have died of, or one for lack of time. Text of cJSON's, or NULL. */
+static char *describe_death(struct supervisor *s, const struct slot *slot, const struct store_job *job, const char *words)
 {
     struct problem problem;
     cJSON *attempts = describe_attempts(s, job->id);
     cJSON *last = cJSON_GetArrayItem(attempts, cJSON_GetArraySize(attempts) - 1);
     if (last)
         cJSON_ReplaceItemInObjectCaseSensitive(last, "last_words", cJSON_CreateString(words));
-    problem_set(&problem, 500, "worker-died", "the worker died again and again",
-                "%u attempts died without getting further; the last one ended with %.*s", job->n_failures + 1,
-                (int)strcspn(words, "\n"), words);
+    if (slot->over_time)
+        describe_limit(s, slot, &problem);
+    else
+        problem_set(&problem, 500, "worker-died", "the worker died again and again",
+                    "%u attempts died without getting further; the last one ended with %.*s", job->n_failures + 1,
+                    (int)strcspn(words, "\n"), words);
     cJSON *object = problem_to_json(&problem);
     cJSON_AddItemToObject(object, "attempts", attempts);
     char *text = cJSON_PrintUnformatted(object);
@@ -207,10 +229,10 @@ static groom_status settle(struct supervisor *s, const struct slot *slot, const 
     } else if (!slot->drained) {
         move.attempt_state = STORE_ATTEMPT_DIED;
         move.not_before_ms = store_now_ms() + backoff_ms(s, job->n_failures);
-        if (job->n_failures + 1 >= s->options.max_deaths) {
+        if (slot->over_time || job->n_failures + 1 >= s->options.max_deaths) {
             move.to = STORE_JOB_FAILED;
             move.not_before_ms = 0;
-            move.error = error = describe_death(s, job, words);
+            move.error = error = describe_death(s, slot, job, words);
         }
     }
     groom_status status = move_or_cancel(s, &move, diag);
@@ -237,7 +259,7 @@ static void finish_slot(struct supervisor *s, struct slot *slot)
         status = settle(s, slot, &job, &diag);
     store_job_finish(&job);
     if (status != GROOM_OK && status != GROOM_ECONFLICT && status != GROOM_ENOTFOUND) {
-        complain("an attempt's end could not be written", &diag);
+        complain(slot, "an attempt's end could not be written", &diag);
         slot->retry_ms = now_ms() + RETRY_MS;
         return;
     }
@@ -265,9 +287,18 @@ static void go_on_stopping(struct supervisor *s, struct slot *slot, uint32_t gra
         return;
     enum launch_stop how = slot->stopping == TERMINATE_NEXT ? LAUNCH_TERMINATE : LAUNCH_KILL;
     if (launcher->table->stop(launcher, slot->handle, how, &diag) != GROOM_OK)
-        complain("a worker could not be stopped", &diag);
+        complain(slot, "a worker could not be stopped", &diag);
     slot->stopping = how == LAUNCH_TERMINATE ? KILL_NEXT : KILLED;
     slot->stop_ms = now_ms() + grace_ms;
+}
+
+/* Its time is up: SIGTERM, so that its checkpoint and its last words are kept, then SIGKILL. */
+static void watch_the_clock(struct slot *slot)
+{
+    if (!slot->late_ms || slot->over_time || slot->drained || now_ms() < slot->late_ms)
+        return;
+    slot->over_time = true;
+    begin_stopping(slot, now_ms());
 }
 
 /* A launcher that lives on elsewhere learns late how a process ended; the process has been quicker. */
@@ -291,7 +322,7 @@ static void review_slot(struct supervisor *s, struct slot *slot)
     else if (job.cancel_requested)
         begin_stopping(slot, now_ms() + grace);
     if (runs_this(&job, &slot->ref) && says_it_ends(s, slot) && settle(s, slot, &job, &diag) != GROOM_OK)
-        complain("an attempt's end could not be written", &diag);
+        complain(slot, "an attempt's end could not be written", &diag);
     store_job_finish(&job);
 }
 
@@ -301,11 +332,12 @@ static void poll_slot(struct supervisor *s, struct slot *slot)
     struct launch_status status = {.state = LAUNCH_RUNNING};
     struct groom_diag diag = {0};
     if (launcher->table->poll(launcher, slot->handle, &status, &diag) != GROOM_OK) {
-        complain("a worker could not be asked after", &diag);
+        complain(slot, "a worker could not be asked after", &diag);
         return;
     }
     if (status.state == LAUNCH_ENDED) {
         slot->ended = true;
+        slot->over_time |= status.over_time;
         slot->drained |= slot->adopted && status.unknown; /* nobody knows whose fault that was */
         snprintf(slot->words, sizeof slot->words, "%s", status.words);
     }
@@ -357,14 +389,17 @@ static void start_slot(struct supervisor *s, struct slot *slot, const struct sto
 {
     struct groom_diag diag = {0};
     *slot = (struct slot){.used = true, .ref = *ref};
+    if (s->options.wall_s && !s->options.launcher->table->handle_of) /* a cluster has its own clock, and a queue */
+        slot->late_ms = now_ms() + 1000 * (int64_t)s->options.wall_s;
     name_log(s, slot);
     count(s, 1, 1, 0);
+    log_job(CONFIG_LOG_INFO, "job", ref->job_id, ref->number, "\"state\":\"running\"");
     jobs_notify(s->jobs, ref->job_id);
     if (launch(s, slot, token, &diag) != GROOM_OK) {
         slot->ended = true;
         snprintf(slot->words, sizeof slot->words, "%s", diag.detail);
     } else if (store_attempt_launched(s->jobs->store, ref, slot->handle, &diag) != GROOM_OK) {
-        complain("a worker's handle could not be written", &diag);
+        complain(slot, "a worker's handle could not be written", &diag);
     }
 }
 
@@ -380,7 +415,7 @@ static bool fill_slot(struct supervisor *s, struct slot *slot)
     if (status == GROOM_OK)
         status = store_job_take(s->jobs->store, hash, &ref, &taken, &next_ms, &diag);
     if (status != GROOM_OK) {
-        complain("the next job could not be taken", &diag);
+        complain(NULL, "the next job could not be taken", &diag);
         next_ms = store_now_ms() + RETRY_MS;
     }
     if (!taken) {
@@ -426,6 +461,8 @@ static void see_to_slot(struct supervisor *s, struct slot *slot, bool nudged, bo
     }
     if (!slot->ended)
         poll_slot(s, slot);
+    if (!slot->ended)
+        watch_the_clock(slot);
     go_on_stopping(s, slot, grace_ms);
     if (slot->ended)
         finish_slot(s, slot);

@@ -4,7 +4,8 @@
  * its end. A worker that ends without a result has died: the job is queued again after a back-off and
  * goes on from its last checkpoint, until too many attempts in a row have died without a new one; then
  * it has failed, with its history and the worker's last words (a problem "worker-died" with
- * "attempts":[{"attempt","state","started_at","last_words"},…]). A job that is to be cancelled: the worker hears it with its next
+ * "attempts":[{"attempt","state","started_at","last_words"},…]). One that has taken more time than it may
+ * fails at once ("time-limit", with the same history): another attempt would take as long. A job that is to be cancelled: the worker hears it with its next
  * report, gets SIGTERM after a second and SIGKILL after another.
  *
  * Where the launcher's processes outlive the daemon (a cluster), draining leaves them alone and the next
@@ -32,6 +33,7 @@ struct supervisor_options {
     const char *work_url;           /* "http://127.0.0.1:PORT"; borrowed */
     const char *log_folder;         /* stderr of attempts: <log_folder>/<job>.<attempt>.log; is made */
     struct launch_limits limits;    /* of each attempt */
+    uint32_t wall_s;                /* by the clock, of each attempt of this machine; 0: no limit */
     struct launch_size size;        /* of each attempt; what is 0 there is estimated from its job */
 };
 

@@ -181,6 +181,8 @@ static groom_status write_message(struct jobs *jobs, const struct store_attempt_
     else
         status = groom_fail(diag, GROOM_ENOMEM, "no memory for a progress message");
     bool seen = status == GROOM_OK && m.row.n_events > 0;
+    if (status == GROOM_OK && m.stage[0])
+        stage_clock_enter(jobs->clock, ref, job->kind, m.stage);
     message_finish(&m);
     if (seen)
         jobs_notify(jobs, ref->job_id);

@@ -44,6 +44,7 @@ enum launch_state { LAUNCH_RUNNING, LAUNCH_ENDED };
 struct launch_status {
     enum launch_state state;
     bool unknown;    /* ended, or never begun: there is no trace of it */
+    bool over_time;  /* ended for having used more processor time than its limits allow */
     char words[320]; /* how it ended, for people: "exit status 1", "signal 9 (Killed)" */
 };
 

@@ -131,7 +131,15 @@ static groom_status local_start(struct launcher *launcher, const struct launch_s
 
 static void say_gone(struct launch_status *status)
 {
-    *status = (struct launch_status){LAUNCH_ENDED, true, "gone"};
+    *status = (struct launch_status){.state = LAUNCH_ENDED, .unknown = true, .words = "gone"};
+}
+
+/* SIGXCPU comes from RLIMIT_CPU alone. What is out of address space says so itself. */
+static void say_how(int wait_status, struct launch_status *status)
+{
+    status->state = LAUNCH_ENDED;
+    status->over_time = WIFSIGNALED(wait_status) && WTERMSIG(wait_status) == SIGXCPU;
+    spawn_words(wait_status, status->words, sizeof status->words);
 }
 
 static groom_status local_poll(struct launcher *launcher, const char *handle, struct launch_status *status,
@@ -151,8 +159,7 @@ static groom_status local_poll(struct launcher *launcher, const char *handle, st
     }
     pid_t waited = waitpid(process.pid, &how, WNOHANG);
     if (waited == process.pid) {
-        status->state = LAUNCH_ENDED;
-        spawn_words(how, status->words, sizeof status->words);
+        say_how(how, status);
     } else if (waited < 0 && errno == ECHILD && state == 'Z') {
         say_gone(status); /* a former daemon's, that nobody has waited for yet */
     }

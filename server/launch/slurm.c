@@ -251,7 +251,7 @@ static void apply_row(struct entry *entry, const struct slurm_row *row)
     } else if (!slurm_row_lives(row)) {
         describe_end(entry, row);
     } else if (is_stuck(row)) {
-        log_message(CONFIG_LOG_WARNING, "Slurm holds %s (%s); it is taken out", entry->name, row->reason);
+        log_attempt(CONFIG_LOG_WARNING, "Slurm holds a job that cannot start; it is taken out", entry->name);
         entry->stopping = entry->stop_due = true;
         entry->stop = LAUNCH_KILL;
         entry->state = ENTRY_THERE;
@@ -269,7 +269,7 @@ static void sweep(struct slurm *s, const struct slurm_rows *rows)
         const struct slurm_row *row = &rows->items[i];
         if (!slurm_row_lives(row) || strncmp(row->name, "job_", 4) != 0 || !s->stale(s->stale_user, row->name))
             continue;
-        log_message(CONFIG_LOG_INFO, "Slurm still has %s, which nobody wants: cancelled", row->name);
+        log_attempt(CONFIG_LOG_INFO, "Slurm still has a job that nobody wants: cancelled", row->name);
         if (slurm_cancel(&s->commands, row->name, LAUNCH_KILL, &diag) != GROOM_OK)
             complain(s, &diag);
     }
@@ -407,7 +407,7 @@ static groom_status slurm_poll(struct launcher *launcher, const char *handle, st
     const char *name = name_of(handle);
     *status = (struct launch_status){.state = LAUNCH_RUNNING};
     if (!name) {
-        *status = (struct launch_status){LAUNCH_ENDED, true, "gone: it was not launched by Slurm"};
+        *status = (struct launch_status){.state = LAUNCH_ENDED, .unknown = true, .words = "gone: it was not launched by Slurm"};
         return GROOM_OK;
     }
     pthread_mutex_lock(&s->lock);

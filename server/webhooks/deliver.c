@@ -177,7 +177,7 @@ static void log_try(const struct store_webhook *webhook, const char *outcome, lo
 /* 2xx is heard; 410 says that nobody wants to hear any more. */
 static void note_outcome(struct webhooks *webhooks, const struct store_webhook *webhook, const struct call *call)
 {
-    char error[CURL_ERROR_SIZE];
+    char error[CURL_ERROR_SIZE], words[600];
     struct groom_diag diag = {0};
     enum store_webhook_state state = STORE_WEBHOOK_WAITING;
     snprintf(error, sizeof error, "%s", call->error);
@@ -192,7 +192,8 @@ static void note_outcome(struct webhooks *webhooks, const struct store_webhook *
     int64_t due = state == STORE_WEBHOOK_WAITING ? store_now_ms() + pause_ms(webhooks, webhook->n_attempts) : 0;
     log_try(webhook, store_webhook_state_name(state), call->status, error);
     if (store_webhook_tried(webhooks->options.store, webhook->id, state, due, (int)call->status, error, &diag) != GROOM_OK)
-        log_message(CONFIG_LOG_WARNING, "what came of a webhook could not be written: %s", diag.detail);
+        log_job(CONFIG_LOG_WARNING, "what came of a webhook could not be written", webhook->job_id, 0, "\"error\":\"%s\"",
+                log_escape(diag.detail, words, sizeof words));
 }
 
 static void deliver(struct webhooks *webhooks, const struct store_webhook *webhook)

@@ -109,6 +109,25 @@ test('a worker does a job from its order to its result', async (t) => {
   const losses = (await expect(daemon, 200, 'GET', `/v1/jobs/${job.id}/losses`)).json;
   assert.deepEqual(losses.initialize, [{ iteration: 1, name: 'position', value: 0.5 }, { iteration: 2, name: 'position', value: 0.25 }]);
 
+  await t.test('how long its stages took is in /metrics', async () => {
+    const { text } = await expect(daemon, 200, 'GET', '/metrics');
+    for (const stage of stages) {
+      assert.match(text, new RegExp(`^groomd_stage_seconds_count\\{kind="fit",stage="${stage}"\\} 1$`, 'm'));
+      assert.match(text, new RegExp(`^groomd_stage_seconds_bucket\\{kind="fit",stage="${stage}",le="3600"\\} 1$`, 'm'));
+    }
+  });
+  await t.test('each line of the log that is about it has its id, and that of the request', async () => {
+    const lines = daemon.log().trim().split('\n').map((line) => JSON.parse(line));
+    // what is refused before its token was looked at is about nobody's job
+    const about = lines.filter((line) => (/^\/v1\/work/.test(line.path ?? '') && line.token) || /^\/v1\/jobs\//.test(line.path ?? '') || line.message === 'job' || (line.method === 'POST' && line.path === '/v1/jobs'));
+    assert.ok(about.length > 8);
+    for (const line of about) assert.equal(line.job, job.id, JSON.stringify(line));
+    const moves = lines.filter(({ message }) => message === 'job');
+    assert.deepEqual(moves.map(({ state }) => state), ['queued', 'running', 'succeeded']);
+    assert.equal(moves[0].request, lines.find((line) => line.method === 'POST' && line.path === '/v1/jobs').request);
+    assert.equal(moves[2].request, lines.find((line) => line.path === '/v1/work/result' && line.status === 204).request);
+    assert.equal(moves[2].attempt, 1);
+  });
   await t.test('its events are replayed from any of them', async () => {
     const all = await events(daemon, `/v1/jobs/${job.id}/events`);
     assert.deepEqual(all.map(({ id }) => id), all.map((_, i) => i + 1));

@@ -84,6 +84,18 @@ test('a killed worker: a new attempt goes on and ends with the same bits', optio
   assert.ok(await progressAtStartOf(daemon, job, 2) > await progressAtStartOf(daemon, job, 1), 'it went on from the checkpoint');
 });
 
+test('a worker that somebody else asks to end: it keeps what it has done, and the next one goes on', options, async (t) => {
+  const daemon = await startDaemon(t), job = await submit(daemon);
+  await midway(daemon, job);
+  const [pid] = daemon.workers(), reached = (await daemon.json(`/v1/jobs/${job}`)).progress;
+  process.kill(pid, 'SIGTERM');
+  const state = await ended(daemon, job);
+  assert.ok((await strandsOf(daemon, state)).equals(undisturbed), 'the same bits');
+  assert.equal(state.attempt, 2);
+  assert.match(daemon.log(), /"state":"queued","attempt_state":"died","last_words":"exit status 75"/);
+  assert.ok(await progressAtStartOf(daemon, job, 2) >= reached, 'nothing of it was done again');
+});
+
 test('a killed daemon: its worker goes with it, and the job ends with the same bits after the restart', options, async (t) => {
   const daemon = await startDaemon(t), job = await submit(daemon);
   await midway(daemon, job);

@@ -602,6 +602,67 @@ START_TEST(a_poison_job_fails_with_its_history_and_last_words)
 }
 END_TEST
 
+/* Its only attempt, and the error of the job. */
+static cJSON *fail_for_lack_of_time(const char *script, struct supervisor_options options)
+{
+    char id[STORE_ID_SIZE];
+    supervise(script, options);
+    submit(id);
+    wait_state(id, STORE_JOB_FAILED);
+    struct store_job job = get(id);
+    cJSON *error = cJSON_Parse(job.error);
+    ck_assert_uint_eq(job.attempt, 1);
+    ck_assert_str_eq(cJSON_GetObjectItem(error, "type")->valuestring, "/problems/time-limit");
+    ck_assert_int_eq(cJSON_GetArraySize(cJSON_GetObjectItem(error, "attempts")), 1);
+    store_job_finish(&job);
+    return error;
+}
+
+START_TEST(a_job_out_of_processor_time_fails_at_once)
+{
+    begin();
+    struct supervisor_options options = quick;
+    options.limits.cpu_s = 1;
+    cJSON *error = fail_for_lack_of_time("while :; do :; done", options);
+    ck_assert_ptr_nonnull(strstr(cJSON_GetObjectItem(error, "detail")->valuestring, "1 s of processor time (--job-time)"));
+    cJSON_Delete(error);
+    end();
+}
+END_TEST
+
+/* It uses no processor time at all, and hears SIGTERM first: its last words are kept. */
+START_TEST(a_job_out_of_time_by_the_clock_fails_at_once)
+{
+    begin();
+    struct supervisor_options options = quick;
+    options.wall_s = 1;
+    cJSON *error = fail_for_lack_of_time("trap 'echo was told; exit 75' TERM; while :; do sleep 0.05; done", options);
+    ck_assert_ptr_nonnull(strstr(cJSON_GetObjectItem(error, "detail")->valuestring, "1 s of time (--job-wall)"));
+    const cJSON *attempt = cJSON_GetArrayItem(cJSON_GetObjectItem(error, "attempts"), 0);
+    const char *words = cJSON_GetObjectItem(attempt, "last_words")->valuestring;
+    ck_assert(!strncmp(words, "exit status 75\n", 15) && strstr(words, "was told\n"));
+    cJSON_Delete(error);
+    end();
+}
+END_TEST
+
+/* Nobody here did that: as far as the queue knows it has died, and the next one goes on. */
+START_TEST(a_worker_that_others_stop_is_followed_by_another)
+{
+    begin();
+    char id[STORE_ID_SIZE];
+    supervise(SAY_TOKEN "[ -e $D/once ] && exec sleep 60; touch $D/once; exit 75", quick);
+    submit(id);
+    wait_attempt();
+    ck_assert_uint_eq(wait_attempt().number, 2);
+    struct store_job job = get(id);
+    ck_assert_int_eq(job.state, STORE_JOB_RUNNING);
+    ck_assert_uint_eq(job.n_failures, 1);
+    store_job_finish(&job);
+    end();
+}
+END_TEST
+
 START_TEST(a_worker_that_cannot_be_started_counts_as_dead)
 {
     begin();
@@ -852,7 +913,8 @@ TEST_SUITE("jobs", a_job_reads_as_the_contract_names_it,
            a_worker_hears_of_the_cancellation_and_may_not_succeed,
            a_worker_that_hands_in_its_result_has_done_the_job,
            a_worker_that_dies_is_followed_by_another_from_its_checkpoint,
-           a_poison_job_fails_with_its_history_and_last_words, a_worker_that_cannot_be_started_counts_as_dead,
+           a_poison_job_fails_with_its_history_and_last_words, a_job_out_of_processor_time_fails_at_once,
+           a_job_out_of_time_by_the_clock_fails_at_once, a_worker_that_others_stop_is_followed_by_another, a_worker_that_cannot_be_started_counts_as_dead,
            a_cancelled_worker_is_really_stopped, slots_work_side_by_side_and_no_more_than_there_are,
            draining_gives_the_jobs_back_without_a_mark, a_killed_daemon_loses_nothing,
            a_cancellation_outlives_the_daemon, blobs_without_rows_are_collected_and_others_kept,
