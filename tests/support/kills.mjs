@@ -101,14 +101,15 @@ export class Workload {
     if (this.told(answer, [200], `events of ${id}`)) this.events.set(id, answer.bytes.toString());
   }
 
-  start(n_clients, max_jobs = Infinity) {
+  /** Each client pauses up to pace_ms between two calls. */
+  start(n_clients, max_jobs = Infinity, pace_ms = 25) {
     this.running = true;
     const doings = ['upload', 'submit', 'submit', 'edit', 'edit', 'follow'];
     this.clients = Array.from({ length: n_clients }, async (_, i) => {
       const client = { name: `client-${i}`, next: random(this.seed * 1000 + i), n: 0, limit: max_jobs };
       while (this.running) {
         await this[doings[Math.floor(client.next() * doings.length)]](client);
-        await sleep(5 + 20 * client.next());
+        await sleep(pace_ms * (0.2 + 0.8 * client.next()));
       }
     });
   }
