@@ -25,7 +25,7 @@ const struct option_row options_table[] = {
     {"/visibility", OPTION_GROUP_OR_NULL, 0, ALL(0), 0, 0,
      "What the capture was seen by: strands that no camera sees leave the losses of the stages."},
     {"/visibility/cameras", OPTION_CAMERAS, AT(cameras), ALL(0), 0, GROOM_FIT_MAX_CAMERAS,
-     "Pinhole cameras: pixels and metres, world to camera, x right, y down, z forward."},
+     "Pinhole cameras: pixels and metres, world to camera, x right, y down, z forward; or NeRF's transforms.json; or COLMAP's text."},
     {"/visibility/least_seen", OPTION_REAL, AT(least_seen), ALL(0.1), 0, 1,
      "Share of a strand's vertices that some camera must see; strands of which less is seen leave the losses."},
     {"/stages", OPTION_GROUP, 0, ALL(0), 0, 0, "The hyperparameters of each stage."},

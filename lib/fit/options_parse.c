@@ -134,20 +134,7 @@ static groom_status parse_operators(const cJSON *json, struct groom_fit_options 
 
 static groom_status parse_cameras(const cJSON *json, struct groom_fit_options *options, struct groom_diag *diag)
 {
-    const cJSON *item;
-    uint32_t n = 0;
-    if (!cJSON_IsArray(json) || cJSON_GetArraySize(json) > GROOM_FIT_MAX_CAMERAS)
-        return groom_fail_field(diag, GROOM_EINVAL, "/visibility/cameras",
-                                "cameras must be an array of at most %d cameras", GROOM_FIT_MAX_CAMERAS);
-    cJSON_ArrayForEach(item, json) {
-        char pointer[MAX_PATH];
-        snprintf(pointer, sizeof pointer, "/visibility/cameras/%u", n);
-        groom_status st = camera_from_json(item, pointer, &options->cameras[n++], diag);
-        if (st != GROOM_OK)
-            return st;
-    }
-    options->n_cameras = n;
-    return GROOM_OK;
+    return cameras_from_json(json, "/visibility/cameras", options->cameras, GROOM_FIT_MAX_CAMERAS, &options->n_cameras, diag);
 }
 
 /* --- the tree ------------------------------------------------------------------- */

@@ -171,6 +171,11 @@ static int put_operators(cJSON *schema)
     return 0;
 }
 
+#define FRAME_SCHEMA                                                                                         \
+    "\"unit\":{\"description\":\"of the capture: m, cm, mm, dm, in or a number of metres\",\"type\":[\"string\",\"number\"]},"  \
+    "\"up\":{\"enum\":[\"y\",\"z\"]}"
+
+/* Ours, or the files that reconstructions come with. */
 static int put_cameras(cJSON *schema)
 {
     static const char camera[] =
@@ -184,8 +189,28 @@ static int put_cameras(cJSON *schema)
         "\"rotation\":{\"type\":\"array\",\"minItems\":3,\"maxItems\":3,\"items\":{\"type\":\"array\","
         "\"minItems\":3,\"maxItems\":3,\"items\":{\"type\":\"number\"}}},"
         "\"translation\":{\"type\":\"array\",\"minItems\":3,\"maxItems\":3,\"items\":{\"type\":\"number\"}}}}";
-    return put_text(schema, "type", "array") && cJSON_AddNumberToObject(schema, "maxItems", GROOM_FIT_MAX_CAMERAS) &&
-           put(schema, "items", cJSON_Parse(camera));
+    static const char transforms[] =
+        "{\"type\":\"object\",\"description\":\"NeRF's transforms.json as it is\",\"required\":[\"frames\"],"
+        "\"properties\":{" FRAME_SCHEMA ",\"frames\":{\"type\":\"array\",\"items\":{\"type\":\"object\","
+        "\"required\":[\"transform_matrix\"]}}}}";
+    static const char texts[] =
+        "{\"type\":\"object\",\"description\":\"COLMAP's cameras.txt and images.txt, each as one string\","
+        "\"required\":[\"cameras_txt\",\"images_txt\"],\"additionalProperties\":false,\"properties\":{" FRAME_SCHEMA
+        ",\"cameras_txt\":{\"type\":\"string\"},\"images_txt\":{\"type\":\"string\"}}}";
+    cJSON *list = cJSON_CreateObject(), *forms = cJSON_AddArrayToObject(schema, "oneOf");
+    int whole = list && put_text(list, "type", "array") && cJSON_AddNumberToObject(list, "maxItems", GROOM_FIT_MAX_CAMERAS) &&
+                put(list, "items", cJSON_Parse(camera));
+    if (!forms || !whole) {
+        cJSON_Delete(list);
+        return 0;
+    }
+    cJSON *form[] = {list, cJSON_Parse(transforms), cJSON_Parse(texts)};
+    for (int i = 0; i < 3; i++)
+        if (!form[i] || !cJSON_AddItemToArray(forms, form[i])) {
+            cJSON_Delete(form[i]);
+            whole = 0;
+        }
+    return whole;
 }
 
 static cJSON *group_schema(const char *group);

@@ -122,15 +122,16 @@ static groom_status read_transforms(const cJSON *file, struct groom_frame frame,
 
 /* --- our own ---------------------------------------------------------------------------------- */
 
-static groom_status read_own(const cJSON *file, struct groom_camera *cameras, uint32_t most, uint32_t *n, struct groom_diag *diag)
+static groom_status read_own(const cJSON *list, const char *pointer, struct groom_camera *cameras, uint32_t most, uint32_t *n,
+                             struct groom_diag *diag)
 {
     const cJSON *item;
-    cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(file, "cameras")) {
-        char pointer[32];
+    cJSON_ArrayForEach(item, list) {
+        char of_item[128];
         if (*n == most)
             return groom_fail(diag, GROOM_ETOOBIG, "there are more than %u cameras", most);
-        snprintf(pointer, sizeof pointer, "/cameras/%u", *n);
-        groom_status st = camera_from_json(item, pointer, &cameras[*n], diag);
+        snprintf(of_item, sizeof of_item, "%.90s/%u", pointer, *n);
+        groom_status st = camera_from_json(item, of_item, &cameras[*n], diag);
         if (st != GROOM_OK)
             return st;
         (*n)++;
@@ -147,7 +148,7 @@ groom_status groom_cameras_read_json(const char *json, size_t n_bytes, struct gr
     if (cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(file, "frames")))
         st = read_transforms(file, frame, cameras, most, &found, diag);
     else if (cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(file, "cameras")))
-        st = read_own(file, cameras, most, &found, diag);
+        st = read_own(cJSON_GetObjectItemCaseSensitive(file, "cameras"), "/cameras", cameras, most, &found, diag);
     else
         st = groom_fail(diag, GROOM_EFORMAT, "this is neither {\"cameras\":[...]} nor a transforms.json with \"frames\"");
     cJSON_Delete(file);
@@ -278,6 +279,55 @@ groom_status groom_cameras_read_colmap(const char *lenses, size_t n_lenses, cons
         found++;
         next_line(&at, end, &points_end, 1); /* the image's points, empty or not */
     }
+    *n = found;
+    return GROOM_OK;
+}
+
+/* --- in options ----------------------------------------------------------------------------------- */
+
+/* "unit": a word or a number of metres; "up": "y" or "z". */
+static groom_status read_frame(const cJSON *json, const char *pointer, struct groom_frame *frame, struct groom_diag *diag)
+{
+    const cJSON *unit = cJSON_GetObjectItemCaseSensitive(json, "unit"), *up = cJSON_GetObjectItemCaseSensitive(json, "up");
+    char at[128], number[40];
+    *frame = (struct groom_frame){.unit_m = 1};
+    snprintf(number, sizeof number, "%.17g", cJSON_IsNumber(unit) ? unit->valuedouble : 1);
+    snprintf(at, sizeof at, "%.90s/unit", pointer);
+    if (unit && groom_unit_parse(cJSON_IsString(unit) ? unit->valuestring : number, &frame->unit_m, NULL) != GROOM_OK)
+        return groom_fail_field(diag, GROOM_EINVAL, at, "unit must be m, cm, mm, dm, in or a number of metres");
+    snprintf(at, sizeof at, "%.90s/up", pointer);
+    if (up && (!cJSON_IsString(up) || groom_up_parse(up->valuestring, &frame->up, NULL) != GROOM_OK))
+        return groom_fail_field(diag, GROOM_EINVAL, at, "up must be \"y\" or \"z\"");
+    return GROOM_OK;
+}
+
+static groom_status read_texts(const cJSON *json, const char *pointer, struct groom_frame frame, struct groom_camera *cameras,
+                               uint32_t most, uint32_t *n, struct groom_diag *diag)
+{
+    const char *lenses = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(json, "cameras_txt"));
+    const char *images = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(json, "images_txt"));
+    if (!lenses || !images)
+        return groom_fail_field(diag, GROOM_EINVAL, pointer,
+                                "cameras must be an array of cameras, a transforms.json with \"frames\", or COLMAP's files "
+                                "as the texts \"cameras_txt\" and \"images_txt\"");
+    return groom_cameras_read_colmap(lenses, strlen(lenses), images, strlen(images), frame, cameras, most, n, diag);
+}
+
+groom_status cameras_from_json(const cJSON *json, const char *pointer, struct groom_camera *cameras, uint32_t most,
+                               uint32_t *n, struct groom_diag *diag)
+{
+    struct groom_frame frame;
+    struct groom_diag own = {0};
+    uint32_t found = 0;
+    groom_status st;
+    if (cJSON_IsArray(json))
+        st = read_own(json, pointer, cameras, most, &found, &own);
+    else if ((st = read_frame(json, pointer, &frame, &own)) == GROOM_OK)
+        st = cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(json, "frames"))
+                 ? read_transforms(json, frame, cameras, most, &found, &own)
+                 : read_texts(json, pointer, frame, cameras, most, &found, &own);
+    if (st != GROOM_OK)
+        return groom_fail_field(diag, GROOM_EINVAL, own.pointer[0] ? own.pointer : pointer, "%s", own.detail);
     *n = found;
     return GROOM_OK;
 }

@@ -49,6 +49,30 @@ test('a job is queued with all of its options, listed and found', async (t) => {
   await refused(daemon, 404, 'not-found', 'GET', '/v1/jobs/job_nothing/losses');
 });
 
+test('cameras come as NeRF and COLMAP write them', async (t) => {
+  const daemon = await startIdleDaemon(t);
+  const { id: strands } = await upload(daemon);
+  const frame = { file_path: 'images/front.png', transform_matrix: [[1, 0, 0, 0], [0, 1, 0, 160], [0, 0, 1, 100], [0, 0, 0, 1]] };
+  const forms = [
+    { w: 640, h: 480, fl_x: 500, unit: 'cm', frames: [frame] },
+    { unit: 'cm', cameras_txt: '1 SIMPLE_PINHOLE 640 480 500 320 240\n', images_txt: '1 0 1 0 0 0 160 100 1 images/front.png\n\n' },
+  ];
+  for (const cameras of forms) {
+    const job = await submit(daemon, { strands, options: { visibility: { cameras } } });
+    assert.equal(job.options.visibility.cameras.length, 1);
+    const [{ name, fx, width, translation, rotation }] = job.options.visibility.cameras;
+    assert.deepEqual({ name, fx, width }, { name: 'front.png', fx: 500, width: 640 });
+    [0, 1.6, 1].forEach((wanted, k) => assert.ok(Math.abs(translation[k] - wanted) < 1e-9));
+    [[1, 0, 0], [0, -1, 0], [0, 0, -1]].flat().forEach((wanted, k) => assert.ok(Math.abs(rotation.flat()[k] - wanted) < 1e-9));
+  }
+  const post = (cameras, pointer) => refused(daemon, 400, 'invalid-argument', 'POST', '/v1/jobs',
+    { body: { kind: 'fit', strands, options: { visibility: { cameras } } }, problem: { pointer } });
+  await post({ frames: [{}] }, '/options/visibility/cameras');
+  await post({ frames: [frame], unit: 'ell' }, '/options/visibility/cameras/unit');
+  await post({ cameras_txt: '', images_txt: '1 2 3' }, '/options/visibility/cameras');
+  await post('front', '/options/visibility/cameras');
+});
+
 test('an idempotency key makes one job', async (t) => {
   const daemon = await startIdleDaemon(t);
   const { id: strands } = await upload(daemon);

@@ -1,5 +1,6 @@
 /* options of a fit: defaults, parsing, printing, schema */
 #include <cjson/cJSON.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -105,6 +106,11 @@ START_TEST(a_wrong_value_is_refused_where_it_stands)
     refused("{\"stages\":null}", "/stages");
     refused("{\"visibility\":{\"cameras\":{}}}", "/visibility/cameras");
     refused("{\"visibility\":{\"cameras\":[{\"width\":0}]}}", "/visibility/cameras/0/width");
+    refused("{\"visibility\":{\"cameras\":{\"frames\":[{}]}}}", "/visibility/cameras");
+    refused("{\"visibility\":{\"cameras\":{\"frames\":[],\"unit\":\"ell\"}}}", "/visibility/cameras/unit");
+    refused("{\"visibility\":{\"cameras\":{\"frames\":[],\"up\":\"x\"}}}", "/visibility/cameras/up");
+    refused("{\"visibility\":{\"cameras\":{\"cameras_txt\":\"\"}}}", "/visibility/cameras");
+    refused("{\"visibility\":{\"cameras\":{\"cameras_txt\":\"\",\"images_txt\":\"1 1 0 0\"}}}", "/visibility/cameras");
     refused("{\"stages\":{\"initialize\":{\"estimate_operators\":1}}}", "/stages/initialize/estimate_operators");
     refused("{\"guides\":10,\"operator_guides\":11}", "/operator_guides");
     refused("{\"guides\":2}", "/interpolation_guides");
@@ -138,6 +144,31 @@ START_TEST(printing_fills_in_defaults_and_reads_back_the_same)
     ck_assert_ptr_nonnull(strstr(json, "\"operator_guides\":\t\"auto\""));
     free(json);
     free(json_again);
+}
+END_TEST
+
+/* A camera at (0, 1.6, 1) that looks along -z, three times. */
+START_TEST(cameras_of_files_become_our_own)
+{
+    static const char *const forms[] = {
+        "[{\"width\":640,\"height\":480,\"fx\":500,\"fy\":500,\"cx\":320,\"cy\":240,\"rotation\":[[1,0,0],[0,-1,0],[0,0,-1]],"
+        "\"translation\":[0,1.6,1]}]",
+        "{\"w\":640,\"h\":480,\"fl_x\":500,\"aabb_scale\":16,\"unit\":\"cm\",\"frames\":[{\"transform_matrix\":"
+        "[[1,0,0,0],[0,1,0,160],[0,0,1,100],[0,0,0,1]]}]}",
+        "{\"unit\":0.1,\"cameras_txt\":\"1 SIMPLE_PINHOLE 640 480 500 320 240\\n\",\"images_txt\":\"# q, t\\n1 0 1 0 0 0 16 10 1\\n\\n\"}"};
+    for (int form = 0; form < 3; form++) {
+        char json[600];
+        snprintf(json, sizeof json, "{\"visibility\":{\"cameras\":%s}}", forms[form]);
+        struct groom_fit_options options = parsed(json);
+        const struct groom_camera *camera = &options.cameras[0];
+        double pixel[2], depth;
+        ck_assert_uint_eq(options.n_cameras, 1);
+        ck_assert_uint_eq(camera->width, 640);
+        ck_assert_int_eq(groom_camera_project(camera, (float[3]){0.1f, 1.5f, 0}, pixel, &depth), 1);
+        ck_assert_double_eq_tol(pixel[0], 370, 1e-4);
+        ck_assert_double_eq_tol(pixel[1], 290, 1e-4);
+        ck_assert_double_eq_tol(depth, 1, 1e-6);
+    }
 }
 END_TEST
 
@@ -194,5 +225,5 @@ END_TEST
 TEST_SUITE("fit_options", nothing_means_the_papers_defaults, quality_sets_defaults_and_an_option_overrides_them,
            the_contracts_example_is_read, an_unknown_name_is_refused_with_the_nearest_one,
            a_wrong_value_is_refused_where_it_stands, what_is_no_object_is_refused,
-           printing_fills_in_defaults_and_reads_back_the_same, the_schema_describes_every_option,
+           printing_fills_in_defaults_and_reads_back_the_same, cameras_of_files_become_our_own, the_schema_describes_every_option,
            defaults_lie_in_their_ranges)

@@ -120,7 +120,9 @@ struct groom_fit_options {
 /* The defaults of a quality. */
 void groom_fit_options_init(groom_fit_quality quality, struct groom_fit_options *options);
 
-/* Options from a JSON object; what it leaves out has its default (n = 0: all).
+/* Options from a JSON object; what it leaves out has its default (n = 0: all). visibility.cameras may be an array of
+ * cameras (groom/camera.h), a transforms.json, or {"cameras_txt","images_txt"} with COLMAP's texts; the last two with
+ * "unit" and "up" of the capture where it is not in metres, y up.
  * returns  GROOM_OK, or GROOM_EINVAL (not JSON, a name that is not known, a value of the wrong type or
  *          out of range) with the JSON pointer of the culprit and, for a name, the nearest known one;
  *          GROOM_ENOMEM. out is untouched on error */
