@@ -96,6 +96,24 @@ void http_response_finish(struct http_response *response)
 
 /* --- callbacks of libcurl ---------------------------------------------------- */
 
+/* n bytes of the parts, from t->at on. */
+static void copy_parts(const struct transfer *t, char *buffer, size_t n)
+{
+    uint64_t skip = t->at;
+    for (unsigned i = 0; i < t->request->n_parts && n > 0; i++) {
+        const struct http_part *part = &t->request->parts[i];
+        if (skip >= part->n) {
+            skip -= part->n;
+            continue;
+        }
+        size_t here = part->n - (size_t)skip < n ? part->n - (size_t)skip : n;
+        memcpy(buffer, (const char *)part->bytes + skip, here);
+        buffer += here;
+        n -= here;
+        skip = 0;
+    }
+}
+
 static size_t on_send(char *buffer, size_t size, size_t n, void *user)
 {
     struct transfer *t = user;
@@ -104,6 +122,8 @@ static size_t on_send(char *buffer, size_t size, size_t n, void *user)
     size_t piece = size * n < left ? size * n : (size_t)left;
     if (request->body) {
         memcpy(buffer, (const char *)request->body + t->at, piece);
+    } else if (request->n_parts) {
+        copy_parts(t, buffer, piece);
     } else if (piece) {
         ssize_t got = read(request->body_fd, buffer, piece);
         if (got <= 0)
@@ -122,7 +142,8 @@ static int on_rewind(void *user, curl_off_t offset, int origin)
     struct transfer *t = user;
     if (origin != SEEK_SET)
         return CURL_SEEKFUNC_CANTSEEK;
-    if (!t->request->body && lseek(t->request->body_fd, (off_t)offset - (off_t)t->at, SEEK_CUR) < 0)
+    if (!t->request->body && !t->request->n_parts &&
+        lseek(t->request->body_fd, (off_t)offset - (off_t)t->at, SEEK_CUR) < 0)
         return CURL_SEEKFUNC_CANTSEEK;
     t->at = (uint64_t)offset;
     return CURL_SEEKFUNC_OK;
@@ -228,7 +249,7 @@ static int set_headers(struct http_client *client, struct transfer *t)
 static void set_body(struct transfer *t)
 {
     const struct http_request *request = t->request;
-    if (!request->body && request->body_fd <= 0) {
+    if (!request->body && request->body_fd <= 0 && !request->n_parts) {
         if (!strcmp(request->method, "HEAD"))
             curl_easy_setopt(t->easy, CURLOPT_NOBODY, 1L);
         else if (!strcmp(request->method, "POST")) {

@@ -46,15 +46,23 @@ struct http_response {
 void http_response_finish(struct http_response *response); /* takes zeroed values */
 
 #define HTTP_MAX_HEADERS 6
+#define HTTP_MAX_PARTS 4
+struct http_part {
+    const void *bytes;
+    size_t n;
+};
 struct http_request {
     const char *method;    /* "GET" */
     const char *path;      /* "/v1/jobs?limit=5", already percent-encoded */
     const char *headers[HTTP_MAX_HEADERS]; /* "If-Match: \"3\""; NULL ends */
     const char *content_type;              /* of the body */
-    /* The body: n_body bytes of memory, or of body_fd from where it stands (body NULL, body_fd > 0). */
+    /* The body: n_body bytes of memory, or of body_fd from where it stands (body NULL, body_fd > 0), or of
+     * `parts`, one after the other (both missing, n_parts > 0). */
     const void *body;
     int body_fd;
     uint64_t n_body;
+    struct http_part parts[HTTP_MAX_PARTS];
+    unsigned n_parts;
     /* Bytes of a 2xx answer as they come; anything but n stops the call. NULL: collected in
      * response->body, as the bodies of other answers always are (up to 256 MB). */
     size_t (*sink)(void *user, const char *bytes, size_t n);

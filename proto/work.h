@@ -19,9 +19,9 @@
  *
  * Of an edit (kind "ruffle", "sculpt", "interpolate", "curl_scale"):
  *   GET  /v1/work/layer                200 the layer as in a document, its arrays inline
- *   GET  /v1/work/strands              200 the strands that come into it: HAIR, metres
+ *   GET  /v1/work/strands              200 the strands that come into it (proto/strand_stream.h)
  *   POST /v1/work/result               2xx; body: a line {"report":{…},"contact":{…}?}, then the strands
- *                                      that come out of it: HAIR. The report's numbers, each optional:
+ *                                      that come out of it, the same way. The report's numbers, each optional:
  *                                      strands changed conversion_error seconds energy_before energy_after
  *                                      anchors anchor_error_mean anchor_error_max iterations_median
  *                                      iterations_max unfinished contact_checked contact_entered

@@ -142,10 +142,17 @@ struct grooms_layer_job {
 /* The layer on its own, with its arrays: for a groom whose base are the strands below. */
 GROOM_MUST_CHECK groom_status grooms_job_layer(struct grooms *grooms, const struct grooms_layer_job *job, char **json,
                                                struct groom_diag *diag);
-/* The strands that come into it, as HAIR in metres. */
+/* The strands that come into it, held until they are released. */
+struct grooms_held {
+    const struct groom_strands *strands;
+    struct grooms *grooms;
+    struct state *state;
+};
 GROOM_MUST_CHECK groom_status grooms_job_strands(struct grooms *grooms, const struct grooms_layer_job *job,
-                                                 struct groom_sink sink, struct groom_diag *diag);
-/* What the worker made of it: a line of JSON {"report":{…},"contact":{…}}, and behind it the strands as HAIR.
+                                                 struct grooms_held *held, struct groom_diag *diag);
+void grooms_release(struct grooms_held *held);
+/* What the worker made of it: a line of JSON {"report":{…},"contact":{…}}, and behind it the strands
+ * (proto/strand_stream.h).
  * store    stores the revision and the answer
  * returns  GROOM_EINVAL also where the groom was changed meanwhile */
 GROOM_MUST_CHECK groom_status grooms_job_result(struct grooms *grooms, const struct grooms_layer_job *job,

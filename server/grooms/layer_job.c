@@ -1,10 +1,11 @@
 /* An edit of many strands: the daemon hands out the layer and the strands that come into it, a worker
  * solves, the daemon writes the revision. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "groom/format.h"
 #include "proto/json_text.h"
+#include "proto/strand_stream.h"
 #include "server/grooms/layer_edit.h"
 
 /* The job as the edit that it was. */
@@ -75,17 +76,20 @@ groom_status grooms_job_layer(struct grooms *grooms, const struct grooms_layer_j
     return status;
 }
 
-groom_status grooms_job_strands(struct grooms *grooms, const struct grooms_layer_job *job, struct groom_sink sink,
+groom_status grooms_job_strands(struct grooms *grooms, const struct grooms_layer_job *job, struct grooms_held *held,
                                 struct groom_diag *diag)
 {
     struct reopened r = {0};
-    const struct groom_write_options options = {.format = GROOM_FORMAT_HAIR};
     groom_status status = reopen(grooms, job, diag, &r, NULL);
-    if (status == GROOM_OK)
-        status = groom_strands_write(r.trial.before->strands, &options, sink, &grooms->context, diag);
+    if (status == GROOM_OK) {
+        *held = (struct grooms_held){r.trial.before->strands, grooms, r.trial.before};
+        r.trial.before = NULL;
+    }
     close_again(&r);
     return status;
 }
+
+void grooms_release(struct grooms_held *held) { states_release(held->grooms->states, held->state); }
 
 /* --- what it hands in ---------------------------------------------------------------------------- */
 
@@ -122,18 +126,36 @@ static void read_report(const cJSON *json, struct groom_layer_report *r)
     r->contact.depth_after_m = (float)number(json, "contact_depth_after");
 }
 
+static int make_room(void *user, struct strand_stream *stream)
+{
+    struct trial *trial = user;
+    const struct groom_strands *before = trial->before->strands;
+    if (stream->n_strands != before->n_strands || stream->n_vertices != before->n_vertices ||
+        groom_strands_create(stream->n_strands, stream->n_vertices, &trial->grooms->context, &trial->after, NULL) != GROOM_OK)
+        return 0;
+    stream->first = trial->after->first;
+    stream->points = trial->after->points;
+    return 1;
+}
+
+static int are_finite(const struct groom_strands *strands)
+{
+    for (uint32_t i = 0; i < strands->n_vertices; i++)
+        if (!isfinite(strands->points[i][0]) || !isfinite(strands->points[i][1]) || !isfinite(strands->points[i][2]))
+            return 0;
+    return 1;
+}
+
 static groom_status read_strands(struct trial *trial, const char *bytes, size_t n_bytes)
 {
-    struct groom_memory_source memory;
-    struct groom_source source = groom_source_from_memory(&memory, bytes, n_bytes);
-    const struct groom_read_options options = {.format = GROOM_FORMAT_HAIR};
+    struct strand_stream stream = {.room = make_room, .user = trial};
     const struct groom_strands *before = trial->before->strands;
-    groom_status status = groom_strands_read(&source, &options, &trial->grooms->context, &trial->after, NULL, trial->diag);
-    if (status == GROOM_OK &&
-        (trial->after->n_strands != before->n_strands ||
-         memcmp(trial->after->first, before->first, ((size_t)before->n_strands + 1) * sizeof *before->first) != 0))
-        status = groom_fail(trial->diag, GROOM_EINVAL, "the worker handed in other strands than it was given");
-    return status;
+    if (!strand_stream_take(&stream, bytes, n_bytes) || !strand_stream_is_whole(&stream) ||
+        memcmp(stream.first, before->first, ((size_t)before->n_strands + 1) * sizeof *before->first) != 0)
+        return groom_fail(trial->diag, GROOM_EINVAL, "the worker handed in other strands than it was given");
+    if (!are_finite(trial->after))
+        return groom_fail(trial->diag, GROOM_EINVAL, "the worker handed in strands that are not finite");
+    return GROOM_OK;
 }
 
 groom_status grooms_job_result(struct grooms *grooms, const struct grooms_layer_job *job, const char *bytes,
@@ -147,7 +169,7 @@ groom_status grooms_job_result(struct grooms *grooms, const struct grooms_layer_
     const char *end = memchr(bytes, '\n', n_bytes);
     cJSON *line = end ? json_text_parse(bytes, (size_t)(end - bytes), NULL) : NULL;
     if (!line)
-        return groom_fail(diag, GROOM_EINVAL, "a result is a line of JSON and a HAIR file");
+        return groom_fail(diag, GROOM_EINVAL, "a result is a line of JSON and the strands");
     groom_status status = reopen(grooms, job, diag, &r, cJSON_GetObjectItemCaseSensitive(line, "contact"));
     if (status == GROOM_OK)
         status = read_strands(&r.trial, end + 1, n_bytes - (size_t)(end + 1 - bytes));

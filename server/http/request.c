@@ -183,6 +183,8 @@ void response_finish(struct response *response)
         free(response->bytes);
     if (response->kind == RESPONSE_FILE && response->fd >= 0)
         close(response->fd);
+    if (response->kind == RESPONSE_PIECES && response->pieces)
+        response->pieces->release(response->pieces);
     *response = (struct response){.fd = -1};
 }
 
@@ -218,6 +220,11 @@ void respond_file(struct request *request, const char *content_type, int fd, uin
     struct response *response = begin(request, RESPONSE_FILE, 200, content_type);
     response->fd = fd;
     response->n_file = n_bytes;
+}
+
+void respond_pieces(struct request *request, const char *content_type, struct response_pieces *pieces)
+{
+    begin(request, RESPONSE_PIECES, 200, content_type)->pieces = pieces;
 }
 
 void respond_events(struct request *request, struct event_feed *feed)

@@ -28,7 +28,18 @@ struct MHD_Connection;
 struct server;
 struct upload_writer;
 
-enum response_kind { RESPONSE_NONE, RESPONSE_BYTES, RESPONSE_FILE, RESPONSE_EVENTS };
+enum response_kind { RESPONSE_NONE, RESPONSE_BYTES, RESPONSE_FILE, RESPONSE_EVENTS, RESPONSE_PIECES };
+
+/* Memory that is sent as it lies there. */
+#define RESPONSE_MAX_PIECES 4
+struct response_pieces {
+    struct {
+        const void *bytes;
+        size_t n;
+    } piece[RESPONSE_MAX_PIECES];
+    unsigned n;
+    void (*release)(struct response_pieces *pieces); /* called once, by any thread, when it has been sent or dropped */
+};
 
 #define RESPONSE_MAX_HEADERS 8
 struct response {
@@ -41,6 +52,7 @@ struct response {
     int fd; /* of RESPONSE_FILE */
     uint64_t n_file;
     struct event_feed *feed; /* of RESPONSE_EVENTS */
+    struct response_pieces *pieces; /* of RESPONSE_PIECES */
     char etag[80];           /* with its quotes; "" for none */
     size_t n_headers;
     struct {
@@ -139,6 +151,8 @@ void respond_static(struct request *request, int status, const char *content_typ
 void respond_empty(struct request *request, int status);
 /* fd is taken over; all n_bytes of it from its beginning. Ranges are honoured. */
 void respond_file(struct request *request, const char *content_type, int fd, uint64_t n_bytes);
+/* Memory that stays as it is until pieces->release is called, which it is whatever happens. */
+void respond_pieces(struct request *request, const char *content_type, struct response_pieces *pieces);
 /* The feed is taken over. */
 void respond_events(struct request *request, struct event_feed *feed);
 

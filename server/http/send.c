@@ -89,6 +89,27 @@ static struct MHD_Response *from_bytes(struct request *request)
     return sent;
 }
 
+static void release_pieces(void *user)
+{
+    struct response_pieces *pieces = user;
+    pieces->release(pieces);
+}
+
+static struct MHD_Response *from_pieces(struct request *request)
+{
+    struct response_pieces *pieces = request->response.pieces;
+    struct MHD_IoVec vector[RESPONSE_MAX_PIECES];
+    request->n_sent = 0;
+    for (unsigned i = 0; i < pieces->n; i++) {
+        vector[i] = (struct MHD_IoVec){pieces->piece[i].bytes, pieces->piece[i].n};
+        request->n_sent += pieces->piece[i].n;
+    }
+    struct MHD_Response *sent = MHD_create_response_from_iovec(vector, pieces->n, release_pieces, pieces);
+    if (sent)
+        request->response.pieces = NULL; /* libmicrohttpd releases them */
+    return sent;
+}
+
 static struct MHD_Response *create(struct request *request)
 {
     struct event_feed *feed = request->response.feed;
@@ -100,6 +121,8 @@ static struct MHD_Response *create(struct request *request)
         return events_create_response(feed);
     case RESPONSE_BYTES:
         return from_bytes(request);
+    case RESPONSE_PIECES:
+        return from_pieces(request);
     default:
         respond_failure(request, GROOM_EINTERNAL, NULL);
         return from_bytes(request);

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "proto/json_text.h"
+#include "proto/strand_stream.h"
 #include "server/blobs/blobs.h"
 #include "server/grooms/grooms.h"
 #include "server/http/handlers.h"
@@ -167,18 +168,38 @@ void work_call_layer(struct request *request)
     store_job_finish(&job);
 }
 
-static groom_status write_strands(struct request *request, const struct grooms_layer_job *edit, int fd, uint64_t *n_bytes,
-                                  struct groom_diag *diag)
+/* The head of the stream, and the memory behind it that the store of states holds. */
+struct sent_strands {
+    struct response_pieces pieces; /* first: it is released by its address */
+    struct grooms_held held;
+    char head[STRAND_STREAM_HEAD];
+};
+
+static void release_strands(struct response_pieces *pieces)
 {
-    struct tool_sink *sink = malloc(sizeof *sink);
-    if (!sink)
+    struct sent_strands *sent = (struct sent_strands *)pieces;
+    grooms_release(&sent->held);
+    free(sent);
+}
+
+static groom_status send_strands(struct request *request, const struct grooms_layer_job *edit, struct groom_diag *diag)
+{
+    struct sent_strands *sent = calloc(1, sizeof *sent);
+    if (!sent)
         return GROOM_ENOMEM;
-    groom_status status = grooms_job_strands(request->service->grooms, edit, tool_sink(sink, fd), diag);
-    if (status == GROOM_OK)
-        status = tool_flush(sink);
-    *n_bytes = sink->n_written;
-    free(sink);
-    return status;
+    groom_status status = grooms_job_strands(request->service->grooms, edit, &sent->held, diag);
+    if (status != GROOM_OK) {
+        free(sent);
+        return status;
+    }
+    const struct groom_strands *strands = sent->held.strands;
+    strand_stream_head(strands->n_strands, strands->n_vertices, sent->head);
+    sent->pieces = (struct response_pieces){
+        {{sent->head, sizeof sent->head},
+         {strands->first, ((size_t)strands->n_strands + 1) * sizeof *strands->first},
+         {strands->points, strands->n_vertices * sizeof *strands->points}}, 3, release_strands};
+    respond_pieces(request, STRAND_STREAM_TYPE, &sent->pieces);
+    return GROOM_OK;
 }
 
 void work_call_strands(struct request *request)
@@ -186,19 +207,11 @@ void work_call_strands(struct request *request)
     struct store_job job = {0};
     struct grooms_layer_job edit;
     struct groom_diag diag = {0};
-    uint64_t n_bytes = 0;
-    int fd;
     if (!take_edit(request, &job, &edit))
         return;
-    if ((fd = tool_temporary(request)) >= 0) {
-        groom_status status = write_strands(request, &edit, fd, &n_bytes, &diag);
-        if (status == GROOM_OK) {
-            respond_file(request, "application/octet-stream", fd, n_bytes);
-        } else {
-            close(fd);
-            respond_failure(request, status, &diag);
-        }
-    }
+    groom_status status = send_strands(request, &edit, &diag);
+    if (status != GROOM_OK)
+        respond_failure(request, status, &diag);
     store_job_finish(&job);
 }
 

@@ -1,19 +1,15 @@
 #include "server/worker/edit_attempt.h"
 
 #include <cjson/cJSON.h>
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 #include "groom/document.h"
-#include "groom/format.h"
 #include "groom/layers.h"
 #include "groom/spatial.h"
+#include "proto/strand_stream.h"
 #include "proto/work.h"
 #include "server/worker/clock.h"
-#include "server/worker/receive.h"
 #include "server/worker/worker.h"
 
 struct edit {
@@ -30,19 +26,50 @@ struct edit {
 
 /* --- what is needed ------------------------------------------------------------------------ */
 
+static int make_room(void *user, struct strand_stream *stream)
+{
+    struct edit *e = user;
+    if (groom_strands_create(stream->n_strands, stream->n_vertices, e->context, &e->strands, e->diag) != GROOM_OK)
+        return 0;
+    stream->first = e->strands->first;
+    stream->points = e->strands->points;
+    return 1;
+}
+
+struct reception {
+    struct strand_stream stream;
+    struct edit *edit;
+    int failed;
+};
+
+static void begin(void *user)
+{
+    struct reception *r = user;
+    groom_strands_destroy(r->edit->strands);
+    r->edit->strands = NULL;
+    r->failed = 0;
+    r->stream = (struct strand_stream){.room = make_room, .user = r->edit};
+}
+
+static size_t receive(void *user, const char *bytes, size_t n)
+{
+    struct reception *r = user;
+    r->failed = r->failed || !strand_stream_take(&r->stream, bytes, n);
+    return n; /* to the end, so that the line stays whole */
+}
+
 static groom_status take_strands(struct edit *e)
 {
-    const struct groom_read_options options = {.format = GROOM_FORMAT_HAIR};
-    struct worker_input input;
-    int fd;
-    groom_status st = receive(e->link, WORK_PATH_STRANDS, &fd, e->diag);
+    struct reception r = {.edit = e};
+    begin(&r);
+    groom_status st = work_link_call(e->link,
+                                     &(struct http_request){.method = "GET", .path = WORK_PATH_STRANDS, .sink = receive,
+                                                            .begin = begin, .user = &r}, NULL, e->diag);
     if (st != GROOM_OK)
         return st;
-    worker_input_open(fd, &input);
-    st = groom_strands_read(&input.source, &options, e->context, &e->strands, NULL, e->diag);
-    worker_input_close(&input);
-    close(fd);
-    return st == GROOM_OK ? groom_create_of_strands(e->strands, e->context, &e->groom, e->diag) : st;
+    if (r.failed || !strand_stream_is_whole(&r.stream))
+        return groom_fail(e->diag, GROOM_EIO, "the daemon sent %llu bytes that are no strands", (unsigned long long)r.stream.at);
+    return groom_create_of_strands(e->strands, e->context, &e->groom, e->diag);
 }
 
 static groom_status take_layer(struct edit *e)
@@ -106,41 +133,34 @@ static groom_status add_contact(const struct edit *e, cJSON *root)
     return GROOM_OK;
 }
 
-static groom_status write_result(const struct edit *e, int fd)
+/* {"report":...} and what was found of contact: a line. malloc'ed by cJSON. */
+static groom_status tell(const struct edit *e, char **line)
 {
-    const struct groom_write_options options = {.format = GROOM_FORMAT_HAIR};
-    struct groom_sink sink = worker_fd_sink(&fd);
     cJSON *root = describe(e);
     groom_status st = e->groom->operators[0].layer->contact.n ? add_contact(e, root) : GROOM_OK;
-    char *line = cJSON_PrintUnformatted(root);
+    *line = st == GROOM_OK ? cJSON_PrintUnformatted(root) : NULL;
     cJSON_Delete(root);
-    if (st == GROOM_OK)
-        st = line ? sink.write(sink.user, line, strlen(line)) : GROOM_ENOMEM;
-    if (st == GROOM_OK)
-        st = sink.write(sink.user, "\n", 1);
-    cJSON_free(line);
-    return st == GROOM_OK ? groom_strands_write(e->strands, &options, sink, e->context, e->diag) : st;
+    return st == GROOM_OK && !*line ? groom_fail(e->diag, GROOM_ENOMEM, "no memory for the result") : st;
 }
 
 static groom_status deliver(struct edit *e)
 {
-    int fd = memfd_create("result", MFD_CLOEXEC);
-    if (fd < 0)
-        return groom_fail(e->diag, GROOM_ENOMEM, "no memory for the result");
-    groom_status st = write_result(e, fd);
-    off_t n_bytes = lseek(fd, 0, SEEK_CUR);
-    void *bytes = st == GROOM_OK && n_bytes > 0 ? mmap(NULL, (size_t)n_bytes, PROT_READ, MAP_PRIVATE, fd, 0) : MAP_FAILED;
-    close(fd);
-    if (st == GROOM_OK && bytes == MAP_FAILED)
-        st = groom_fail(e->diag, GROOM_EIO, "the result could not be kept");
-    if (st == GROOM_OK)
-        st = work_link_call(e->link,
-                            &(struct http_request){.method = "POST", .path = WORK_PATH_RESULT,
-                                                   .content_type = "application/octet-stream", .body = bytes,
-                                                   .n_body = (uint64_t)n_bytes},
-                            NULL, e->diag);
-    if (bytes != MAP_FAILED)
-        munmap(bytes, (size_t)n_bytes);
+    const struct groom_strands *strands = e->strands;
+    char *line, head[1 + STRAND_STREAM_HEAD] = "\n";
+    groom_status st = tell(e, &line);
+    if (st != GROOM_OK)
+        return st;
+    strand_stream_head(strands->n_strands, strands->n_vertices, head + 1);
+    struct http_request request = {
+        .method = "POST", .path = WORK_PATH_RESULT, .content_type = STRAND_STREAM_TYPE,
+        .n_body = strlen(line) + 1 + strand_stream_bytes(strands->n_strands, strands->n_vertices),
+        .parts = {{line, strlen(line)},
+                  {head, sizeof head},
+                  {strands->first, ((size_t)strands->n_strands + 1) * sizeof *strands->first},
+                  {strands->points, strands->n_vertices * sizeof *strands->points}},
+        .n_parts = 4};
+    st = work_link_call(e->link, &request, NULL, e->diag);
+    cJSON_free(line);
     return st;
 }
 

@@ -279,11 +279,11 @@ test('an edit whose groom is changed while it waits fails, and says so', async (
   const token = await daemon.attempt();
   const layer = (await expect(daemon, 200, 'GET', '/v1/work/layer', { token })).json;
   assert.equal(layer.type, 'ruffle');
-  assert.equal((await expect(daemon, 200, 'GET', '/v1/work/strands', { token })).bytes.toString('latin1', 0, 4), 'HAIR');
+  assert.equal((await expect(daemon, 200, 'GET', '/v1/work/strands', { token })).bytes.toString('latin1', 0, 8), 'GSTRAND1');
   await edit(daemon, 201, json.groom, 'sculpt', { layer: json.layer, anchors: one });
   const { detail } = (await expect(daemon, 400, 'GET', '/v1/work/layer', { token })).json;
   assert.match(detail, /changed/);
-  await expect(daemon, 400, 'POST', '/v1/work/result', { token, body: '{"report":{}}\nHAIR' });
+  await expect(daemon, 400, 'POST', '/v1/work/result', { token, body: '{"report":{}}\nGSTRAND1' });
   await expect(daemon, 400, 'POST', '/v1/work/result', { token, body: 'nothing' });
   await expect(daemon, 204, 'POST', '/v1/work/failed', { token, body: { type: '/problems/invalid-argument', title: 'x', status: 400, detail } });
   assert.equal((await expect(daemon, 200, 'GET', `/v1/jobs/${job.id}`)).json.state, 'failed');

@@ -182,6 +182,24 @@ START_TEST(client_sends_the_request_and_reads_the_answer)
 }
 END_TEST
 
+START_TEST(client_sends_a_body_of_parts)
+{
+    struct canned server;
+    struct http_response response;
+    canned_start(&server, "HTTP/1.1 204 No Content\r\nConnection: close\r\n\r\n");
+    struct http_client *client = client_to(server.url, NULL);
+    struct http_request request = {.method = "POST", .path = "/v1/x", .n_body = 11,
+                                   .parts = {{"end ", 4}, {"", 0}, {"of b", 4}, {"ody", 3}}, .n_parts = 4};
+    ck_assert_int_eq(http_perform(client, &request, &response), HTTP_ANSWERED);
+    canned_stop(&server);
+    ck_assert_int_eq(response.status, 204);
+    ck_assert_ptr_nonnull(strstr(server.asked, "Content-Length: 11\r\n"));
+    ck_assert_ptr_nonnull(strstr(server.asked, "\r\n\r\nend of body"));
+    http_response_finish(&response);
+    http_client_destroy(client);
+}
+END_TEST
+
 static size_t take_all(void *user, const char *bytes, size_t n)
 {
     strncat(user, bytes, n);
@@ -267,6 +285,6 @@ END_TEST
 
 TEST_SUITE("http_client", job_states_have_names_and_back, url_encodes_what_a_query_may_not_hold,
            url_says_when_it_does_not_fit, events_come_whole_whatever_the_pieces,
-           events_survive_a_reconnect_and_a_flood, client_sends_the_request_and_reads_the_answer,
+           events_survive_a_reconnect_and_a_flood, client_sends_the_request_and_reads_the_answer, client_sends_a_body_of_parts,
            client_keeps_a_problem_out_of_the_sink, client_names_how_a_line_fails,
            client_gives_up_when_interrupted, client_lets_go_of_all_when_a_vital_one_ends)

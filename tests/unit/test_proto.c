@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "proto/problem.h"
+#include "proto/strand_stream.h"
 #include "proto/uri.h"
 #include "tests/support/test.h"
 
@@ -101,6 +102,68 @@ START_TEST(problem_believes_no_odd_json)
 }
 END_TEST
 
-TEST_SUITE("proto", uri_splits_before_it_decodes, uri_takes_root_empty_segments_and_absolute_targets,
+/* --- strands ------------------------------------------------------------------------- */
+
+struct room {
+    uint32_t first[3];
+    float points[3][3];
+};
+
+static int room_for_two(void *user, struct strand_stream *stream)
+{
+    struct room *room = user;
+    if (stream->n_strands != 2 || stream->n_vertices != 3)
+        return 0;
+    stream->first = room->first;
+    stream->points = room->points;
+    return 1;
+}
+
+/* Two strands of 1 and 2 vertices, as they are sent. */
+static size_t two_strands(char *bytes)
+{
+    const uint32_t first[3] = {0, 1, 3};
+    const float points[3][3] = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
+    strand_stream_head(2, 3, bytes);
+    memcpy(bytes + STRAND_STREAM_HEAD, first, sizeof first);
+    memcpy(bytes + STRAND_STREAM_HEAD + sizeof first, points, sizeof points);
+    ck_assert_uint_eq(strand_stream_bytes(2, 3), STRAND_STREAM_HEAD + sizeof first + sizeof points);
+    return STRAND_STREAM_HEAD + sizeof first + sizeof points;
+}
+
+START_TEST(strands_come_whole_in_pieces_of_any_size)
+{
+    char bytes[128];
+    size_t n = two_strands(bytes);
+    for (size_t piece = 1; piece <= n; piece++) {
+        struct room room = {0};
+        struct strand_stream stream = {.room = room_for_two, .user = &room};
+        for (size_t at = 0; at < n; at += piece) {
+            ck_assert_int_eq(strand_stream_is_whole(&stream), 0);
+            ck_assert_int_eq(strand_stream_take(&stream, bytes + at, piece < n - at ? piece : n - at), 1);
+        }
+        ck_assert_int_eq(strand_stream_is_whole(&stream), 1);
+        ck_assert(room.first[2] == 3 && room.points[0][0] == 1.0f && room.points[2][2] == 9.0f);
+        ck_assert_int_eq(strand_stream_take(&stream, "x", 1), 0); /* more than was announced */
+    }
+}
+END_TEST
+
+START_TEST(strands_that_do_not_add_up_are_refused)
+{
+    char bytes[128];
+    size_t n = two_strands(bytes);
+    for (size_t bent = 0; bent < STRAND_STREAM_HEAD + 12; bent++) { /* the head and the offsets: each bit counts */
+        struct room room = {0};
+        struct strand_stream stream = {.room = room_for_two, .user = &room};
+        bytes[bent] ^= 4;
+        int taken = strand_stream_take(&stream, bytes, n), whole = taken && strand_stream_is_whole(&stream);
+        ck_assert_msg(!whole, "byte %zu", bent);
+        bytes[bent] ^= 4;
+    }
+}
+END_TEST
+
+TEST_SUITE("proto", strands_come_whole_in_pieces_of_any_size, strands_that_do_not_add_up_are_refused, uri_splits_before_it_decodes, uri_takes_root_empty_segments_and_absolute_targets,
            uri_refuses_what_is_no_honest_target, problem_survives_the_way_through_json,
            problem_believes_no_odd_json)
