@@ -252,6 +252,8 @@ install: programs
 	install -d $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/bash-completion/completions
 	$(BUILD)/groomctl manual >$(DESTDIR)$(PREFIX)/share/man/man1/groomctl.1
 	$(BUILD)/groomctl completion bash >$(DESTDIR)$(PREFIX)/share/bash-completion/completions/groomctl
+	install -d $(DESTDIR)$(PREFIX)/share/zsh/site-functions
+	$(BUILD)/groomctl completion zsh >$(DESTDIR)$(PREFIX)/share/zsh/site-functions/_groomctl
 	install -m 644 proto/openapi.yaml $(DESTDIR)$(PREFIX)/share/groomd
 
 clean:

@@ -217,6 +217,7 @@ static size_t on_header(char *line, size_t size, size_t n, void *user)
         r->retry_after_s = atoi(seconds);
     keep_number(&r->upload_offset, line, n, "Upload-Offset");
     keep_number(&r->upload_length, line, n, "Upload-Length");
+    keep_number(&r->content_length, line, n, "Content-Length");
     return n;
 }
 
@@ -285,7 +286,7 @@ static int transfer_init(struct transfer *t, struct http_client *client, const s
     memset(t, 0, sizeof *t);
     memset(response, 0, sizeof *response);
     response->retry_after_s = -1;
-    response->upload_offset = response->upload_length = -1;
+    response->upload_offset = response->upload_length = response->content_length = -1;
     t->request = request;
     t->response = response;
     t->code = CURLE_OUT_OF_MEMORY;

@@ -41,6 +41,7 @@ struct http_response {
     char content_type[96], etag[96], location[256]; /* "" where missing */
     int retry_after_s;     /* -1 where missing */
     long long upload_offset, upload_length; /* of tus; -1 where missing */
+    long long content_length; /* of the body, known before it comes; -1 where missing */
     char failure[256];     /* what libcurl says, where not HTTP_ANSWERED */
 };
 void http_response_finish(struct http_response *response); /* takes zeroed values */

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "client/groomctl/api.h"
+#include "client/groomctl/transfer.h"
 #include "proto/url.h"
 
 #define BAR 30        /* characters of a whole bar */
@@ -134,6 +134,7 @@ int command_analyze(struct groomctl *ctl, const struct arguments *arguments)
     static const char *const parameters[] = {"revision",       "count",      "elements", "tolerance",
                                              "straight_below", "wavy_below", "arrays"};
     const char *id = arguments->operands[0];
+    const char *binary = argument(arguments, "binary");
     struct url url;
     cJSON *answer = NULL;
     url_init(&url, !strncmp(id, "str_", 4) ? "/v1/strands" : "/v1/grooms");
@@ -141,6 +142,10 @@ int command_analyze(struct groomctl *ctl, const struct arguments *arguments)
     url_segment(&url, "analysis");
     for (size_t k = 0; k < sizeof passed_on / sizeof passed_on[0]; k++)
         url_query(&url, parameters[k], argument(arguments, passed_on[k]));
+    if (binary) {
+        url_query(&url, "format", "binary");
+        return download_said(ctl, binary, download_file(ctl, url.text, binary));
+    }
     int status = api_json(ctl, "GET", url.text, NULL, NULL, &answer);
     if (status == DONE && ctl->json)
         api_print(ctl, answer);

@@ -76,9 +76,15 @@ static int complain_of_answer(const struct groomctl *ctl, const struct http_resp
 {
     cJSON *json = response->body ? cJSON_ParseWithLength(response->body, response->n_body) : NULL;
     struct problem problem;
-    if (!problem_from_json(json, &problem))
+    int is_problem = problem_from_json(json, &problem);
+    if (!is_problem)
         problem = (struct problem){.status = response->status, .byte_offset = -1};
-    if (ctl->json && json)
+    if (!is_problem && (response->status < 500 || response->status > 504))
+        fprintf(stderr,
+                "groomctl: %s answers (%d), but not as a groomd does\n  name the daemon's address with --server URL; it prints it "
+                "when it starts\n",
+                http_client_base_url(ctl->client), response->status);
+    else if (ctl->json && json)
         fprintf(stderr, "%.*s\n", (int)response->n_body, response->body);
     else
         explain_problem(response, &problem);

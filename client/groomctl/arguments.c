@@ -3,6 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "client/groomctl/nearest.h"
+
 static const struct option_spec *find(const struct option_spec *table, const char *name, size_t n_name,
                                       char letter)
 {
@@ -36,6 +38,21 @@ static int add(struct reading *r, const struct option_spec *spec, const char *va
     return 1;
 }
 
+/* With the option that may have been meant. */
+static int complain_unknown(struct reading *r, const char *text, size_t n_name)
+{
+    struct nearest nearest;
+    char more[48];
+    nearest_init(&nearest, text + 2, n_name);
+    for (const struct option_spec *spec = n_name ? r->table : NULL; spec && spec->name; spec++)
+        nearest_offer(&nearest, spec->name);
+    for (const struct option_spec *spec = n_name ? r->more : NULL; spec && spec->name; spec++)
+        nearest_offer(&nearest, spec->name);
+    snprintf(more, sizeof more, "; --%.40s is one", nearest.name ? nearest.name : "");
+    snprintf(r->arguments->complaint, sizeof r->arguments->complaint, "there is no option %.120s%s", text, nearest.name ? more : "");
+    return 0;
+}
+
 /* One option at argv[at], and its value where that is the next argument. */
 static int read_option(struct reading *r)
 {
@@ -48,7 +65,7 @@ static int read_option(struct reading *r)
     if (!spec)
         spec = find(r->more, name, n_name, letter);
     if (!spec)
-        return complain(r->arguments, "there is no option", text);
+        return complain_unknown(r, text, is_long ? n_name : 0);
     if (equals)
         value = equals + 1;
     else if (!is_long && text[2])

@@ -34,6 +34,9 @@ static const struct option_spec fit_options[] = {
     {"cameras", 0, "FILE", "cameras of the capture, for visibility: cameras.json, transforms.json, or COLMAP's folder of text"},
     {"option", 0, "PATH=VALUE", "any other option: stages.initialize.n_smooth=40 (see: groomctl options)"},
     {"options", 0, "FILE", "options as a JSON object; the ones above come on top"},
+    {"priority", 0, "N", "larger ones go first, -100 to 100 (0)"},
+    {"webhook", 0, "URL", "who is told of the job's end; needs --webhook-secret"},
+    {"webhook-secret", 0, "TEXT", "of the message's signature, 16 characters or more"},
     {"wait", 'w', NULL, "follow the job to its end"},
     {"output", 'o', "FILE", "wait, then export the strands there, in the unit and axis of the upload"},
     {"groom-id-file", 0, "FILE", "wait, then write the groom's id there, for scripts"},
@@ -51,6 +54,39 @@ static const struct option_spec list_options[] = {
     {0},
 };
 
+static const struct option_spec watch_options[] = {
+    {"all", 0, NULL, "every job that runs or waits now"},
+    {0},
+};
+
+static const struct option_spec page_options[] = {
+    {"limit", 0, "N", "rows at most"},
+    {"before", 0, "N", "the page after this place (the list says it)"},
+    {0},
+};
+
+static const struct option_spec save_options[] = {
+    {"output", 'o', "FILE", "write it there (standard output)"},
+    {0},
+};
+
+static const struct option_spec guides_options[] = {
+    {"unit", 0, "U", "of the file: m, cm, mm, dm, in, or a number of metres (m)"},
+    {"up", 0, "A", "its up axis: y or z (y)"},
+    {"format", 0, "F", "what it is, where its bytes do not tell"},
+    {"if-match", 0, "N", "refuse unless the latest revision is this one"},
+    {0},
+};
+
+static const struct option_spec clusters_options[] = {
+    {"count", 0, "N", "clusters (8)"},
+    {"seed", 0, "N", "of these (1)"},
+    {"frames", 0, "N", "of each cluster's armature (4)"},
+    {"revision", 0, "N", "of a groom (the latest)"},
+    {"output", 'o', "FILE", "write the whole answer there, as JSON"},
+    {0},
+};
+
 static const struct option_spec get_options[] = {
     {"revision", 0, "N", "of a groom (the latest)"},
     {"arrays", 0, NULL, "with a groom's large arrays"},
@@ -63,6 +99,7 @@ static const struct option_spec export_options[] = {
     {"format", 0, "F", "hair, usda, ply, obj, data or json (by the file's extension)"},
     {"guides", 0, NULL, "the guides in place of the dense strands"},
     {"count", 0, "N", "a fair sample of so many strands"},
+    {"vertices", 0, "N", "of uploaded strands: each resampled to so many"},
     {"unit", 0, "U", "of the file (m)"},
     {"up", 0, "A", "of the file (y)"},
     {"revision", 0, "N", "the latest where not given"},
@@ -77,6 +114,7 @@ static const struct option_spec analyze_options[] = {
     {"straight-below", 0, "F", "turns per metre under which hair is straight (5)"},
     {"wavy-below", 0, "B", "|beta| up to which hair is wavy and not coiled (0.5)"},
     {"arrays", 0, "LIST", "with --json: elements,vertices,centre,switchbacks,strands"},
+    {"binary", 0, "FILE", "radius, frequency, hand and beta of each vertex there, as float32"},
     {0},
 };
 
@@ -112,6 +150,10 @@ static const struct option_spec compare_options[] = {
     {"unit", 0, "U", "of files: m, cm, mm, dm, in, or a number of metres (m)"},
     {"up", 0, "A", "their up axis: y or z (y)"},
     {"head-file", 0, "FILE", "of files: the head, in the same unit, for what is inside it"},
+    {"picture", 0, "FILE", "no numbers: a PNG with the camera of the target's picture"},
+    {"of", 0, "WHAT", "in the picture: groom, target, or drawn (random numbers from its seeds)"},
+    {"view", 0, "V", "of the picture: front, side, back or top"},
+    {"size", 0, "N", "of the picture, pixels of a side (512)"},
     {0},
 };
 
@@ -191,30 +233,37 @@ const struct command groomctl_commands[] = {
     {"upload-head", "FILE", 1, 1, upload_options, "upload a head or body mesh (OBJ, PLY)", command_upload_head},
     {"fit", "STRANDS|FILE", 1, 1, fit_options, "fit a procedural groom; with -o all the way from file to file", command_fit},
     {"status", "JOB...", 1, MANY, NULL, "where jobs stand", command_status},
-    {"watch", "JOB...", 1, MANY, NULL, "follow jobs live, to their ends", command_watch},
+    {"watch", "JOB...", 0, MANY, watch_options, "follow jobs live, to their ends", command_watch},
     {"cancel", "JOB...", 1, MANY, NULL, "stop jobs", command_cancel},
     {"losses", "JOB", 1, 1, NULL, "the loss curves of a job", command_losses},
+    {"deliveries", "JOB", 1, 1, NULL, "who is told of a job's end by a webhook, and how far that is", command_deliveries},
     {"list", "strands|heads|jobs|grooms", 1, 1, list_options, "what is on the server, newest first", command_list},
-    {"get", "ID", 1, 1, get_options, "all about strands, a head, a job or a groom", command_get},
-    {"delete", "ID...", 1, MANY, NULL, "remove strands, heads or whole grooms; there is no way back", command_delete},
-    {"export", "GROOM|STRANDS", 1, 1, export_options, "strands or guides into a file", command_export},
+    {"get", "ID", 1, 1, get_options, "all about strands, a head, a job, a groom or an upload under way", command_get},
+    {"delete", "ID...", 1, MANY, NULL, "remove strands, heads, whole grooms or uploads under way; there is no way back", command_delete},
+    {"export", "GROOM|STRANDS|HEAD", 1, 1, export_options, "strands or guides into a file; a head as it was uploaded", command_export},
     {"analyze", "GROOM|STRANDS", 1, 1, analyze_options, "what kind of hair it is: curls, handedness, switchbacks", command_analyze},
+    {"clusters", "GROOM|STRANDS", 1, 1, clusters_options, "strands by cluster, and the frames that a sculpt moves", command_clusters},
     {"preview", "GROOM", 1, 1, preview_options, "a shaded picture, from a view or a camera of your own", command_preview},
     {"turntable", "GROOM", 1, 1, turntable_options, "a turn around it: an animated PNG, or its frames", command_turntable},
     {"compare", "GROOM|STRANDS|FILE [TARGET]", 1, 2, compare_options,
      "how alike strands are to a target; a groom's own is what it was fitted to; two files need no server", command_compare},
     {"set", "GROOM /POINTER=VALUE...", 2, MANY, edit_options, "change a groom: /operators/2/radius=0.01", command_set},
     {"patch", "GROOM FILE", 2, 2, edit_options, "change a groom by a JSON Patch or merge patch", command_patch},
+    {"set-guides", "GROOM FILE", 2, 2, guides_options, "replace the guides of a groom, as many as it has", command_set_guides},
     {"ruffle", "GROOM|STRANDS", 1, 1, ruffle_options, "exchange pieces of hair between strands", command_ruffle},
     {"sculpt", "GROOM|STRANDS", 1, 1, sculpt_options, "move control points or clusters, the curls kept", command_sculpt},
     {"interpolate", "GROOM|STRANDS", 1, 1, interpolate_options, "blend with another groom, revision or upload", command_interpolate},
     {"curl-scale", "GROOM|STRANDS", 1, 1, curl_scale_options, "make curls wider or narrower, steeper or flatter", command_curl_scale},
-    {"revisions", "GROOM", 1, 1, NULL, "the history of a groom", command_revisions},
+    {"revisions", "GROOM", 1, 1, page_options, "the history of a groom", command_revisions},
     {"revert", "GROOM REVISION", 2, 2, edit_options, "a new revision that is the same as an earlier one", command_revert},
     {"import", "FILE", 1, 1, NULL, "a groom document of another server", command_import},
     {"sample", "", 0, 0, sample_options, "make a reconstruction with known truth, without a server", command_sample},
     {"options", "", 0, 0, NULL, "every option of a fit, with its default", command_options},
     {"health", "", 0, 0, NULL, "whether the server is alive and ready", command_health},
+    {"whoami", "", 0, 0, NULL, "whose token this is, what for, within which limits", command_whoami},
+    {"audit", "", 0, 0, page_options, "who changed what, newest first (scope admin)", command_audit},
+    {"metrics", "", 0, 0, save_options, "the server's figures, as Prometheus reads them (scope admin)", command_metrics},
+    {"openapi", "", 0, 0, save_options, "the whole interface as OpenAPI 3.1", command_openapi},
     {"completion", "bash|zsh", 1, 1, NULL, "completion for a shell: source <(groomctl completion bash)", command_completion},
     {"manual", "", 0, 0, NULL, "the man page: groomctl manual | man -l -", command_manual},
     {0},

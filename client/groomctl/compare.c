@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "client/groomctl/api.h"
+#include "client/groomctl/transfer.h"
 #include "groom/format.h"
 #include "groom/mesh.h"
 #include "groom/quality.h"
@@ -33,6 +33,22 @@ static int ask_server(struct groomctl *ctl, const char *id, const char *target, 
         status = REFUSED;
     }
     return status;
+}
+
+static int save_picture(struct groomctl *ctl, const struct arguments *arguments, const char *path)
+{
+    static const char *const passed_on[] = {"of", "view", "size", "revision"};
+    const char *id = arguments->operands[0];
+    struct url url;
+    if (strncmp(id, "grm_", 4))
+        return groomctl_usage_error("compare", "--picture shows a groom beside its target: %.40s is none", id);
+    url_init(&url, "/v1/grooms");
+    url_segment(&url, id);
+    url_segment(&url, "quality.png");
+    for (size_t i = 0; i < sizeof passed_on / sizeof passed_on[0]; i++)
+        url_query(&url, passed_on[i], argument(arguments, passed_on[i]));
+    url_query(&url, "with", arguments->n_operands > 1 ? arguments->operands[1] : NULL);
+    return download_said(ctl, path, download_file(ctl, url.text, path));
 }
 
 /* --- here ------------------------------------------------------------------------------------------ */
@@ -179,6 +195,8 @@ int command_compare(struct groomctl *ctl, const struct arguments *arguments)
 {
     const char *what = arguments->operands[0], *target = arguments->n_operands > 1 ? arguments->operands[1] : NULL;
     cJSON *report = NULL;
+    if (argument(arguments, "picture"))
+        return save_picture(ctl, arguments, argument(arguments, "picture"));
     if (is_file(what) != (target ? is_file(target) : is_file(what)))
         return groomctl_usage_error("compare", "both are ids or both are files: upload the file first");
     if (!target && strncmp(what, "grm_", 4))

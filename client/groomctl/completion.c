@@ -79,14 +79,112 @@ static void print_bash(void)
           stdout);
 }
 
+/* --- zsh ---------------------------------------------------------------------------------------- */
+
+/* Text within single quotes and a description's brackets. */
+static void put_description(const char *text)
+{
+    for (; *text; text++)
+        if (*text == '\'')
+            fputs("'\\''", stdout);
+        else if (strchr("[]:\\", *text))
+            printf("\\%c", *text);
+        else
+            putchar(*text);
+}
+
+static const char *values_of(const char *option)
+{
+    for (size_t i = 0; i < sizeof choices / sizeof choices[0]; i++)
+        if (!strcmp(choices[i].option, option))
+            return choices[i].values;
+    return NULL;
+}
+
+/* '(-o --output)'{-o,--output}'[where to]:FILE:_files' */
+static void print_zsh_option(const struct option_spec *option)
+{
+    const char *values = values_of(option->name);
+    if (option->letter)
+        printf(" '(-%c --%s)'{-%c,--%s}'", option->letter, option->name, option->letter, option->name);
+    else
+        printf(" '*--%s", option->name);
+    putchar('[');
+    put_description(option->help);
+    putchar(']');
+    if (option->value && values)
+        printf(":%s:(%s)", option->value, values);
+    else if (option->value)
+        printf(":%s:%s", option->value, strstr(option->value, "FILE") || strstr(option->value, "FOLDER") ? "_files" : " ");
+    putchar('\'');
+}
+
+static void print_zsh_options(const struct option_spec *table)
+{
+    for (; table && table->name; table++)
+        print_zsh_option(table);
+}
+
+static void print_zsh_operands(const struct command *command)
+{
+    const char *ids = listed(command);
+    if (!strcmp(ids, "kinds"))
+        fputs(" '1:kind:(strands heads jobs grooms)'", stdout);
+    else if (ids[0])
+        printf(" '*:id:_groomctl_ids %s'", ids);
+    else if (command->max_operands)
+        fputs(" '*:file:_files'", stdout);
+}
+
+static void print_zsh(void)
+{
+    fputs("#compdef groomctl\n"
+          "# groomctl completion zsh: sourced, or kept as _groomctl in a folder of $fpath\n"
+          "_groomctl_ids() {\n"
+          "    local kind; local -a ids\n"
+          "    for kind in $argv; do\n"
+          "        [[ $kind == (grooms|strands|heads|jobs) ]] || continue\n"
+          "        ids+=(${(f)\"$(groomctl list $kind --limit 50 --json 2>/dev/null | sed -n 's/.*\"id\":\"\\([a-z]*_[a-z0-9]*\\)\".*/\\1/p')\"})\n"
+          "    done\n"
+          "    compadd -a ids\n"
+          "    _files\n"
+          "}\n"
+          "_groomctl() {\n"
+          "    local context state line; typeset -A opt_args\n"
+          "    local -a commands=(\n", stdout);
+    for (const struct command *c = groomctl_commands; c->name; c++) {
+        printf("        '%s:", c->name);
+        put_description(c->summary);
+        fputs("'\n", stdout);
+    }
+    fputs("    )\n    _arguments -C", stdout);
+    print_zsh_options(groomctl_global_options);
+    fputs(" '1:command:->command' '*::argument:->argument'\n"
+          "    case $state in\n"
+          "        command) _describe command commands ;;\n"
+          "        argument) case $words[1] in\n", stdout);
+    for (const struct command *c = groomctl_commands; c->name; c++) {
+        printf("            %s) _arguments", c->name);
+        print_zsh_options(c->options);
+        print_zsh_options(groomctl_global_options);
+        print_zsh_operands(c);
+        fputs(" ;;\n", stdout);
+    }
+    fputs("        esac ;;\n    esac\n}\n"
+          "if [[ $funcstack[1] == _groomctl ]]; then _groomctl \"$@\"; else\n"
+          "    (( $+functions[compdef] )) || { autoload -U compinit && compinit }\n"
+          "    compdef _groomctl groomctl\nfi\n", stdout);
+}
+
 int command_completion(struct groomctl *ctl, const struct arguments *arguments)
 {
     const char *shell = arguments->operands[0];
     (void)ctl;
     if (strcmp(shell, "bash") && strcmp(shell, "zsh"))
         return groomctl_usage_error("completion", "\"%s\" is no shell that it knows; take bash or zsh", shell);
-    if (!strcmp(shell, "zsh")) /* zsh runs bash's completions */
-        fputs("autoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit\n", stdout);
-    print_bash();
+    if (!strcmp(shell, "zsh"))
+        print_zsh();
+    else
+        print_bash();
     return DONE;
 }

@@ -1,4 +1,4 @@
-/* set, patch, revisions, revert, import: grooms and their history. */
+/* set, patch, set-guides, revisions, revert, import: grooms and their history. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -35,18 +35,16 @@ static void print_edit(const struct groomctl *ctl, const cJSON *answer)
 }
 
 /* A body of some media type under If-Match. */
-static int edit(struct groomctl *ctl, const struct arguments *arguments, const char *method, const char *part,
-                const char *media_type, const char *body, size_t n_body)
+static int edit_at(struct groomctl *ctl, const struct arguments *arguments, const char *method, const struct url *url,
+                   const char *media_type, const char *body, size_t n_body)
 {
     char header[128];
-    struct url url;
     struct http_response response;
     int status = if_match(ctl, arguments, header, sizeof header);
     if (status != DONE)
         return status;
-    groom_url(&url, arguments->operands[0], part);
     struct http_request request = {.method = method,
-                                   .path = url.text,
+                                   .path = url->text,
                                    .headers = {header},
                                    .content_type = media_type,
                                    .body = body,
@@ -58,6 +56,14 @@ static int edit(struct groomctl *ctl, const struct arguments *arguments, const c
     cJSON_Delete(answer);
     http_response_finish(&response);
     return status;
+}
+
+static int edit(struct groomctl *ctl, const struct arguments *arguments, const char *method, const char *part,
+                const char *media_type, const char *body, size_t n_body)
+{
+    struct url url;
+    groom_url(&url, arguments->operands[0], part);
+    return edit_at(ctl, arguments, method, &url, media_type, body, n_body);
 }
 
 /* --- set and patch -------------------------------------------------------------------------- */
@@ -109,6 +115,20 @@ int command_patch(struct groomctl *ctl, const struct arguments *arguments)
     return status;
 }
 
+int command_set_guides(struct groomctl *ctl, const struct arguments *arguments)
+{
+    struct url url;
+    size_t n = 0;
+    char *file = read_whole_file(arguments->operands[1], &n);
+    groom_url(&url, arguments->operands[0], "guides");
+    url_query(&url, "format", argument(arguments, "format"));
+    url_query(&url, "unit", argument(arguments, "unit"));
+    url_query(&url, "up", argument(arguments, "up"));
+    int status = file ? edit_at(ctl, arguments, "PUT", &url, "application/octet-stream", file, n) : REFUSED;
+    free(file);
+    return status;
+}
+
 /* --- history ---------------------------------------------------------------------------------- */
 
 int command_revisions(struct groomctl *ctl, const struct arguments *arguments)
@@ -117,6 +137,8 @@ int command_revisions(struct groomctl *ctl, const struct arguments *arguments)
     cJSON *page = NULL;
     const cJSON *row;
     groom_url(&url, arguments->operands[0], "revisions");
+    url_query(&url, "limit", argument(arguments, "limit"));
+    url_query(&url, "before", argument(arguments, "before"));
     int status = api_json(ctl, "GET", url.text, NULL, NULL, &page);
     if (status != DONE)
         return status;
@@ -128,6 +150,8 @@ int command_revisions(struct groomctl *ctl, const struct arguments *arguments)
             printf("%4.0f  %s  %-10s  %s\n", api_number(row, "revision", 0), api_text(row, "created_at"),
                    api_text(row, "note"), api_text(row, "name"));
     }
+    if (!ctl->json && api_number(page, "next", 0) > 0)
+        fprintf(stderr, "there is more: groomctl revisions %s --before %.0f\n", arguments->operands[0], api_number(page, "next", 0));
     cJSON_Delete(page);
     return DONE;
 }

@@ -135,29 +135,44 @@ static int build_options(const struct arguments *arguments, cJSON **out)
 
 /* --- inputs --------------------------------------------------------------------------------- */
 
-/* An id stays as it is; anything else is a file to upload. */
+/* What was uploaded already. */
+static int look_at(struct groomctl *ctl, enum sized_thing thing, const char *id, cJSON **answer)
+{
+    struct url url;
+    url_init(&url, thing == SIZED_HEAD ? "/v1/heads" : "/v1/strands");
+    url_segment(&url, id);
+    return api_json(ctl, "GET", url.text, NULL, NULL, answer);
+}
+
+/* An id stays as it is; anything else is a file to upload. *answer: the upload, the caller's to delete. */
 static int resolve(struct groomctl *ctl, const struct arguments *arguments, enum sized_thing thing,
-                   const char *what, char id[64])
+                   const char *what, cJSON **answer)
 {
     struct upload_options options = upload_options_of(arguments);
-    cJSON *answer = NULL;
     if (!strncmp(what, thing == SIZED_HEAD ? "head_" : "str_", thing == SIZED_HEAD ? 5 : 4) &&
-        access(what, F_OK)) {
-        snprintf(id, 64, "%s", what);
-        return DONE;
-    }
+        access(what, F_OK))
+        return look_at(ctl, thing, what, answer);
     if (thing == SIZED_HEAD)
         options.format = options.name = NULL;
     if (thing == SIZED_HEAD && argument(arguments, "head-unit"))
         options.unit = argument(arguments, "head-unit");
     if (thing == SIZED_HEAD && argument(arguments, "head-up"))
         options.up = argument(arguments, "head-up");
-    int status = upload_file(ctl, thing, what, &options, &answer);
+    int status = upload_file(ctl, thing, what, &options, answer);
     if (status == DONE)
-        upload_describe(ctl, thing, &options, answer);
-    snprintf(id, 64, "%s", api_text(answer, "id"));
-    cJSON_Delete(answer);
+        upload_describe(ctl, thing, &options, *answer);
     return status;
+}
+
+static void hint_where_apart(const cJSON *strands, const cJSON *head)
+{
+    struct sized_box hair_box, head_box;
+    char text[256];
+    if (!upload_box(strands, &hair_box) || !upload_box(head, &head_box))
+        return;
+    apart_hint_text(&hair_box, &head_box, text, sizeof text);
+    if (text[0])
+        fprintf(stderr, "hint: %s\n", text);
 }
 
 /* --- the job ----------------------------------------------------------------------------------- */
@@ -177,10 +192,34 @@ static void idempotency_header(char *header, size_t size)
         n += (size_t)snprintf(header + n, size - n, "%02x", bytes[i]);
 }
 
-static int submit(struct groomctl *ctl, const char *strands, const char *head, cJSON *options, cJSON **job)
+/* Who is told of the end. returns  0 where half of it is missing (and said so) */
+static int add_webhook(const struct arguments *arguments, cJSON *body)
+{
+    const char *url = argument(arguments, "webhook"), *secret = argument(arguments, "webhook-secret");
+    if (!url && !secret)
+        return 1;
+    if (!url || !secret) {
+        groomctl_usage_error("fit", "--webhook and --webhook-secret go together");
+        return 0;
+    }
+    cJSON *webhook = cJSON_AddObjectToObject(body, "webhook");
+    cJSON_AddStringToObject(webhook, "url", url);
+    cJSON_AddStringToObject(webhook, "secret", secret);
+    return 1;
+}
+
+static int submit(struct groomctl *ctl, const struct arguments *arguments, const char *strands, const char *head, cJSON *options,
+                  cJSON **job)
 {
     char header[96];
+    const char *priority = argument(arguments, "priority");
     cJSON *body = cJSON_CreateObject();
+    if (!add_webhook(arguments, body)) {
+        cJSON_Delete(body);
+        return WRONG_USAGE;
+    }
+    if (priority)
+        cJSON_AddItemToObject(body, "priority", json_value(priority));
     idempotency_header(header, sizeof header);
     cJSON_AddStringToObject(body, "kind", "fit");
     cJSON_AddStringToObject(body, "strands", strands);
@@ -229,17 +268,21 @@ static int follow(struct groomctl *ctl, const struct arguments *arguments, const
 
 static int run(struct groomctl *ctl, const struct arguments *arguments, cJSON *options)
 {
-    char strands[64] = "", head[64] = "";
+    cJSON *strands = NULL, *head = NULL;
     const char *head_name =
         argument(arguments, "head-file") ? argument(arguments, "head-file") : argument(arguments, "head");
     int waits =
         argument(arguments, "wait") || argument(arguments, "output") || argument(arguments, "groom-id-file");
     cJSON *job = NULL;
-    int status = resolve(ctl, arguments, SIZED_HAIR, arguments->operands[0], strands);
+    int status = resolve(ctl, arguments, SIZED_HAIR, arguments->operands[0], &strands);
     if (status == DONE && head_name)
-        status = resolve(ctl, arguments, SIZED_HEAD, head_name, head);
+        status = resolve(ctl, arguments, SIZED_HEAD, head_name, &head);
     if (status == DONE)
-        status = submit(ctl, strands, head, options, &job);
+        hint_where_apart(strands, head);
+    if (status == DONE)
+        status = submit(ctl, arguments, api_text(strands, "id"), api_text(head, "id"), options, &job);
+    cJSON_Delete(strands);
+    cJSON_Delete(head);
     if (status == DONE && ctl->json)
         api_print(ctl, job);
     else if (status == DONE)

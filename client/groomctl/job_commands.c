@@ -1,4 +1,4 @@
-/* status, cancel, losses. */
+/* status, cancel, losses, deliveries. */
 #include <stdio.h>
 #include <string.h>
 
@@ -84,4 +84,18 @@ int command_losses(struct groomctl *ctl, const struct arguments *arguments)
     }
     cJSON_Delete(losses);
     return DONE;
+}
+
+int command_deliveries(struct groomctl *ctl, const struct arguments *arguments)
+{
+    struct url url;
+    cJSON *answer = NULL;
+    const cJSON *row;
+    url_init(&url, "/v1/jobs");
+    url_segment(&url, arguments->operands[0]);
+    url_segment(&url, "deliveries");
+    int status = api_json(ctl, "GET", url.text, NULL, NULL, &answer);
+    cJSON_ArrayForEach(row, cJSON_GetObjectItemCaseSensitive(answer, "deliveries")) { api_print(ctl, row); }
+    cJSON_Delete(answer);
+    return status;
 }

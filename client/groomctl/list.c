@@ -16,6 +16,7 @@ static const struct collection {
     {"heads", "head_", "/v1/heads", {"id", "triangles", "vertices", "format", "name", NULL}},
     {"jobs", "job_", "/v1/jobs", {"id", "state", "progress", "kind", "created_at", NULL}},
     {"grooms", "grm_", "/v1/grooms", {"id", "revision", "changed_at", "name", NULL}},
+    {"uploads", "upl_", "/v1/uploads", {NULL}}, /* under way: nobody lists them */
 };
 enum { N_COLLECTIONS = sizeof collections / sizeof collections[0] };
 
@@ -75,7 +76,7 @@ static int list(struct groomctl *ctl, const struct collection *collection, const
 int command_list(struct groomctl *ctl, const struct arguments *arguments)
 {
     for (int i = 0; i < N_COLLECTIONS; i++)
-        if (!strcmp(arguments->operands[0], collections[i].name))
+        if (!strcmp(arguments->operands[0], collections[i].name) && collections[i].columns[0])
             return list(ctl, &collections[i], arguments);
     return groomctl_usage_error("list", "there is no list of \"%s\": strands, heads, jobs or grooms",
                                 arguments->operands[0]);
@@ -98,7 +99,7 @@ int command_get(struct groomctl *ctl, const struct arguments *arguments)
     struct url url;
     cJSON *answer = NULL;
     if (!collection)
-        return groomctl_usage_error("get", "\"%s\" is no id: they start with str_, head_, job_ or grm_", id);
+        return groomctl_usage_error("get", "\"%s\" is no id: they start with str_, head_, job_, grm_ or upl_", id);
     url_init(&url, collection->path);
     url_segment(&url, id);
     url_query(&url, "revision", argument(arguments, "revision"));
@@ -120,11 +121,23 @@ static int delete_one(struct groomctl *ctl, const char *id)
     const struct collection *collection = collection_of(id);
     struct url url;
     if (!collection || !strcmp(collection->name, "jobs"))
-        return groomctl_usage_error("delete", "\"%s\" is no id of strands, a head or a groom (jobs: groomctl cancel)",
+        return groomctl_usage_error("delete", "\"%s\" is no id of strands, a head, a groom or an upload (jobs: groomctl cancel)",
                                     id);
     url_init(&url, collection->path);
     url_segment(&url, id);
+    if (!strcmp(collection->name, "uploads"))
+        return api_json(ctl, "DELETE", url.text, NULL, "Tus-Resumable: 1.0.0", NULL);
     return api_json(ctl, "DELETE", url.text, NULL, NULL, NULL);
+}
+
+static void print_removed(const struct groomctl *ctl, const char *id)
+{
+    cJSON *object = ctl->json ? cJSON_CreateObject() : NULL;
+    if (!object)
+        return;
+    cJSON_AddStringToObject(object, "removed", id);
+    api_print(ctl, object);
+    cJSON_Delete(object);
 }
 
 int command_delete(struct groomctl *ctl, const struct arguments *arguments)
@@ -132,6 +145,8 @@ int command_delete(struct groomctl *ctl, const struct arguments *arguments)
     int worst = DONE;
     for (size_t i = 0; i < arguments->n_operands; i++) {
         int status = delete_one(ctl, arguments->operands[i]);
+        if (status == DONE)
+            print_removed(ctl, arguments->operands[i]);
         worst = status != DONE ? status : worst;
     }
     return worst;

@@ -4,6 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "client/groomctl/nearest.h"
 #include "client/groomctl/token.h"
 #include "client/groomctl/usage.h"
 
@@ -68,6 +69,17 @@ static int run(const struct command *command, const struct arguments *global,
     return interrupted && status != DONE ? INTERRUPTED : status;
 }
 
+static int unknown_command(const char *name)
+{
+    struct nearest nearest;
+    nearest_init(&nearest, name, strlen(name));
+    for (const struct command *c = groomctl_commands; c->name; c++)
+        nearest_offer(&nearest, c->name);
+    if (nearest.name)
+        return groomctl_usage_error(NULL, "there is no command \"%s\"; %s is one", name, nearest.name);
+    return groomctl_usage_error(NULL, "there is no command \"%s\"", name);
+}
+
 int main(int argc, char **argv)
 {
     static struct arguments global, arguments;
@@ -80,7 +92,7 @@ int main(int argc, char **argv)
         return usage_print(stderr), WRONG_USAGE;
     const struct command *command = groomctl_find_command(argv[read + 1]);
     if (!command)
-        return groomctl_usage_error(NULL, "there is no command \"%s\"", argv[read + 1]);
+        return unknown_command(argv[read + 1]);
     if (!arguments_parse(argc - read - 2, argv + read + 2, groomctl_global_options, command->options, 0, NULL,
                          &arguments))
         return groomctl_usage_error(command->name, "%s", arguments.complaint);

@@ -60,8 +60,17 @@ int command_manual(struct groomctl *ctl, const struct arguments *arguments)
     fputs(".SH OPTIONS OF EVERY COMMAND\n", stdout);
     print_options(groomctl_global_options);
     fputs(".SH EXIT STATUS\n0 done, 1 refused or failed, 2 wrong usage, 130 interrupted.\n"
-          ".SH ENVIRONMENT\n.TP\n.B GROOM_SERVER\nthe daemon's address\n.TP\n.B GROOM_TOKEN\nwho is asking\n"
-          ".SH SHELLS\nsource <(groomctl completion bash)\n",
+          ".SH ENVIRONMENT\n.TP\n.B GROOM_SERVER\nthe daemon's address\n.TP\n.B GROOMD_TOKEN\nwho is asking\n"
+          ".SH FILES\n.TP\n.I ~/.config/groom/token\nthe token, where nothing else names one\n"
+          ".TP\n.I ~/.local/state/groomctl/upload\\-*\nuploads that were interrupted; the same command goes on with them\n"
+          ".SH EXAMPLES\nStep by step:\n.PP\n.EX\n"
+          "groomctl upload hair.data \\-\\-unit cm\n"
+          "groomctl fit str_... \\-\\-head\\-file head.obj \\-\\-wait\n"
+          "groomctl set grm_... /operators/2/radius=0.008\n"
+          "groomctl turntable grm_... \\-o turn.png\n"
+          "groomctl export grm_... \\-o groom.usda \\-\\-unit cm\n.EE\n"
+          ".PP\nAll jobs at once:\n.PP\n.EX\ngroomctl watch \\-\\-all\n.EE\n"
+          ".SH SHELLS\nsource <(groomctl completion bash), or zsh\n",
           stdout);
     return DONE;
 }

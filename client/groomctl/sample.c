@@ -169,6 +169,10 @@ static int write_files(const struct groomctl *ctl, const struct groom_sample *sa
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
         if (!path_of(folder, files[i].name, path, sizeof path))
             return groomctl_usage_error("sample", "the folder's name is too long");
+        if (groomctl_interrupted()) {
+            fprintf(stderr, "groomctl: interrupted; %s does not hold all files\n", folder);
+            return INTERRUPTED;
+        }
         int status = files[i].write(sample, path);
         if (status != DONE)
             return status;
@@ -178,12 +182,19 @@ static int write_files(const struct groomctl *ctl, const struct groom_sample *sa
     return ctl->json ? print_summary(ctl, sample, folder) : DONE;
 }
 
+static int is_cancelled(void *user)
+{
+    (void)user;
+    return groomctl_interrupted();
+}
+
 int command_sample(struct groomctl *ctl, const struct arguments *arguments)
 {
     const char *folder = argument(arguments, "output");
     struct groom_sample_options options;
     struct groom_sample *sample = NULL;
-    struct groom_context context = {0};
+    static const struct groom_progress progress = {.cancelled = is_cancelled};
+    struct groom_context context = {.progress = &progress};
     struct groom_diag diag = {0};
     if (!folder)
         return groomctl_usage_error("sample", "-o FOLDER is needed");

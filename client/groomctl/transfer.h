@@ -20,6 +20,9 @@ int upload_file(struct groomctl *ctl, enum sized_thing thing, const char *path, 
 void upload_describe(const struct groomctl *ctl, enum sized_thing thing, const struct upload_options *options,
                      const cJSON *answer);
 
+/* The box of an upload's answer, metres; returns 0 where it has none. */
+int upload_box(const cJSON *answer, struct sized_box *box);
+
 /* The body of a GET into a file ("-": standard output). */
 int download_file(struct groomctl *ctl, const char *url_path, const char *path);
 /* After it: the file's name for people or, with --json, as an object. returns  status */

@@ -107,7 +107,7 @@ int upload_file(struct groomctl *ctl, enum sized_thing thing, const char *path,
 
 /* --- saying what came of it ---------------------------------------------------------------- */
 
-static int extents(const cJSON *answer, double size[3])
+int upload_box(const cJSON *answer, struct sized_box *out)
 {
     const cJSON *box = cJSON_GetObjectItemCaseSensitive(answer, "bbox");
     const cJSON *low = cJSON_GetObjectItemCaseSensitive(box, "min"),
@@ -116,9 +116,19 @@ static int extents(const cJSON *answer, double size[3])
         const cJSON *a = cJSON_GetArrayItem(low, i), *b = cJSON_GetArrayItem(high, i);
         if (!cJSON_IsNumber(a) || !cJSON_IsNumber(b))
             return 0;
-        size[i] = b->valuedouble - a->valuedouble;
+        out->low[i] = a->valuedouble;
+        out->high[i] = b->valuedouble;
     }
     return 1;
+}
+
+static int extents(const cJSON *answer, double size[3])
+{
+    struct sized_box box;
+    int known = upload_box(answer, &box);
+    for (int i = 0; known && i < 3; i++)
+        size[i] = box.high[i] - box.low[i];
+    return known;
 }
 
 static void print_hint(enum sized_thing thing, const struct upload_options *options, const double size[3])

@@ -240,9 +240,46 @@ int jobs_look(struct groomctl *ctl, struct job_view *view, cJSON **resource)
     return status;
 }
 
+/* --- the command ------------------------------------------------------------------------------------ */
+
+/* Jobs in this state, behind those that are there already; as many as can be watched. */
+static int add_jobs(struct groomctl *ctl, const char *state, struct job_view *views, size_t *n)
+{
+    struct url url;
+    cJSON *page = NULL;
+    const cJSON *job;
+    url_init(&url, "/v1/jobs");
+    url_query(&url, "state", state);
+    url_query_number(&url, "limit", JOBS_MAX_WATCHED);
+    int status = api_json(ctl, "GET", url.text, NULL, NULL, &page);
+    cJSON_ArrayForEach(job, cJSON_GetObjectItemCaseSensitive(page, "jobs"))
+    {
+        if (*n < JOBS_MAX_WATCHED)
+            job_view_init(&views[(*n)++], api_text(job, "id"));
+    }
+    cJSON_Delete(page);
+    return status;
+}
+
+static int watch_all(struct groomctl *ctl)
+{
+    struct job_view views[JOBS_MAX_WATCHED];
+    size_t n = 0;
+    int status = add_jobs(ctl, "running", views, &n);
+    if (status == DONE)
+        status = add_jobs(ctl, "queued", views, &n);
+    if (status == DONE && n == 0 && !ctl->json)
+        printf("no job runs or waits\n");
+    return status == DONE && n ? jobs_watch_all(ctl, views, n) : status;
+}
+
 int command_watch(struct groomctl *ctl, const struct arguments *arguments)
 {
     struct job_view views[JOBS_MAX_WATCHED];
+    if (!argument(arguments, "all") == !arguments->n_operands)
+        return groomctl_usage_error("watch", "name jobs, or give --all");
+    if (argument(arguments, "all"))
+        return watch_all(ctl);
     if (arguments->n_operands > JOBS_MAX_WATCHED)
         return groomctl_usage_error("watch", "at most %d jobs at a time", JOBS_MAX_WATCHED);
     for (size_t i = 0; i < arguments->n_operands; i++) {
@@ -250,6 +287,8 @@ int command_watch(struct groomctl *ctl, const struct arguments *arguments)
         int status = jobs_look(ctl, &views[i], NULL);
         if (status != DONE)
             return status;
+        if (ctl->json) /* all events, of jobs that have ended too */
+            job_view_init(&views[i], arguments->operands[i]);
     }
     return jobs_watch_all(ctl, views, arguments->n_operands);
 }

@@ -119,6 +119,9 @@ static groom_status read_statement(struct obj *obj)
 
 static groom_status refuse_no_lines(struct obj *obj)
 {
+    if (obj->reader->out->points.n == 0 && obj->n_faces == 0)
+        return groom_fail_at(obj->reader->diag, GROOM_EFORMAT, 0,
+                             "this is text without a vertex (\"v\") or a line (\"l\") of OBJ in it: no file of strands");
     return groom_fail_at(obj->reader->diag, GROOM_EFORMAT, (int64_t)text_offset(&obj->text),
                          "%llu vertices and %llu faces but no line (\"l\") by byte %llu: %s",
                          (unsigned long long)obj->reader->out->points.n, (unsigned long long)obj->n_faces,

@@ -27,6 +27,14 @@ test('bash completes ids of what the server holds', async (t) => {
   assert.deepEqual(complete(['export', 'grm_'], { GROOM_SERVER: daemon.url }), [json.groom]);
 });
 
+test('zsh gets a script of its own, which parses where zsh is installed', () => {
+  const script = String(spawnSync(`${build}/groomctl`, ['completion', 'zsh']).stdout);
+  for (const command of complete([''])) if (!command.startsWith('-')) assert.ok(script.includes(`\n            ${command}) _arguments`), command);
+  assert.match(script, /^#compdef groomctl\n/);
+  const parsed = spawnSync('zsh', ['-n'], { input: script });
+  if (!parsed.error) assert.equal(String(parsed.stderr), '');
+});
+
 test('the man page has every command and is clean roff', (t) => {
   const page = spawnSync(`${build}/groomctl`, ['manual']);
   assert.equal(page.status, 0);

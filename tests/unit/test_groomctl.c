@@ -11,6 +11,7 @@
 #include "client/groomctl/groomctl.h"
 #include "client/groomctl/jobs.h"
 #include "client/groomctl/json_path.h"
+#include "client/groomctl/nearest.h"
 #include "client/groomctl/output_file.h"
 #include "client/groomctl/progress_bar.h"
 #include "client/groomctl/transfer.h"
@@ -53,7 +54,7 @@ START_TEST(arguments_complain_of_what_is_wrong)
 {
     static struct arguments a;
     ck_assert(!PARSE(&a, "--unti", "cm"));
-    ck_assert_str_eq(a.complaint, "there is no option --unti");
+    ck_assert_str_eq(a.complaint, "there is no option --unti; --unit is one");
     ck_assert(!PARSE(&a, "-x"));
     ck_assert(!PARSE(&a, "x", "--unit"));
     ck_assert_str_eq(a.complaint, "a value is missing behind --unit");
@@ -209,6 +210,49 @@ START_TEST(a_wrong_unit_is_guessed_from_the_size)
 }
 END_TEST
 
+START_TEST(hair_that_lies_apart_from_its_head_is_told)
+{
+    const struct sized_box hair = {{-0.2, 1.4, -0.2}, {0.2, 1.8, 0.2}}, head = {{-0.1, 1.4, -0.1}, {0.1, 1.75, 0.1}};
+    const struct sized_box lying = {{-0.2, -0.2, 1.4}, {0.2, 0.2, 1.8}};     /* z up, read as y up */
+    const struct sized_box standing = {{-0.1, -0.1, -1.75}, {0.1, 0.1, -1.4}}; /* y up, read as z up */
+    const struct sized_box large = {{-20, 140, -20}, {20, 180, 20}}, elsewhere = {{5, 5, 5}, {5.4, 5.4, 5.4}};
+    char text[256];
+    apart_hint_text(&hair, &head, text, sizeof text);
+    ck_assert_str_eq(text, "");
+    apart_hint_text(&lying, &head, text, sizeof text);
+    ck_assert_ptr_nonnull(strstr(text, "the other up axis"));
+    apart_hint_text(&hair, &standing, text, sizeof text);
+    ck_assert_ptr_nonnull(strstr(text, "the other up axis"));
+    apart_hint_text(&large, &head, text, sizeof text);
+    ck_assert_ptr_nonnull(strstr(text, "another unit"));
+    apart_hint_text(&elsewhere, &head, text, sizeof text);
+    ck_assert_ptr_nonnull(strstr(text, "of one capture"));
+}
+END_TEST
+
+static const char *nearest_of(const char *typed)
+{
+    struct nearest nearest;
+    nearest_init(&nearest, typed, strlen(typed));
+    for (const struct command *c = groomctl_commands; c->name; c++)
+        nearest_offer(&nearest, c->name);
+    return nearest.name ? nearest.name : "";
+}
+
+START_TEST(a_mistyped_name_finds_the_one_that_was_meant)
+{
+    static struct arguments a;
+    ck_assert_str_eq(nearest_of("uplaod"), "upload");
+    ck_assert_str_eq(nearest_of("exprot"), "export");
+    ck_assert_str_eq(nearest_of("turn"), "turntable");
+    ck_assert_str_eq(nearest_of("revison"), "revisions");
+    ck_assert_str_eq(nearest_of("frobnicate"), "");
+    ck_assert_str_eq(nearest_of("x"), "");
+    ck_assert(!PARSE(&a, "--ouptut=x"));
+    ck_assert_str_eq(a.complaint, "there is no option --ouptut=x; --output is one");
+}
+END_TEST
+
 START_TEST(units_are_names_or_metres)
 {
     ck_assert(unit_in_metres(NULL) == 1 && unit_in_metres("in") == 0.0254 && unit_in_metres("0.5") == 0.5);
@@ -274,6 +318,6 @@ END_TEST
 TEST_SUITE("groomctl", arguments_take_options_anywhere, arguments_complain_of_what_is_wrong,
            arguments_stop_at_the_command, every_command_can_be_found_and_helps, time_left_reads_well,
            bar_shows_stage_share_loss_and_time, bar_fits_any_width, bar_takes_any_fraction,
-           job_view_follows_events, job_view_takes_a_resource, a_wrong_unit_is_guessed_from_the_size,
+           job_view_follows_events, job_view_takes_a_resource, a_wrong_unit_is_guessed_from_the_size, hair_that_lies_apart_from_its_head_is_told, a_mistyped_name_finds_the_one_that_was_meant,
            units_are_names_or_metres, a_path_names_its_format, assignments_go_where_their_path_says,
            a_file_is_whole_or_not_there)
