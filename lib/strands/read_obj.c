@@ -126,7 +126,9 @@ static groom_status refuse_no_lines(struct obj *obj)
                          "%llu vertices and %llu faces but no line (\"l\") by byte %llu: %s",
                          (unsigned long long)obj->reader->out->points.n, (unsigned long long)obj->n_faces,
                          (unsigned long long)text_offset(&obj->text),
-                         obj->n_faces ? "this is a mesh; upload it as a head" : "strands were expected");
+                         obj->n_faces              ? "this is a mesh; upload it as a head"
+                         : obj->reader->out->points.n ? "strands were expected"
+                                                      : "this is no strand file");
 }
 
 groom_status read_obj(struct reader *reader)

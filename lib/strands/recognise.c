@@ -2,8 +2,8 @@
  *
  * 1. A magic number: HAIR or hair; "ply" and a line end; \x93NUMPY; PK (a zip: npz); f32 3.0 or
  *    4.0 (.tfx). Formats that are known but not read here are named in the hint.
- * 2. Text (no control bytes in the first 512): "{" or "[" is JSON; "version" is .tfx 2; a line
- *    that begins with a statement of OBJ, or a comment, is OBJ.
+ * 2. Text (no control bytes in the first 512): "{" or "[" is JSON; "version" is .tfx 2; where the first
+ *    line that is no comment begins with a statement of OBJ, or all that is at hand is comments, it is OBJ.
  * 3. The formats without a magic number begin with the count of strands:
  *    - MonoHair: counts of strands and points, u16 counts that add up to the points, and a size of
  *      8 + 2 strands + 12 points, where the size is known;
@@ -97,7 +97,11 @@ static int is_obj(const unsigned char *p, const unsigned char *end)
     static const char *const statements[] = {"v", "vn", "vt", "vp",     "l",      "f",      "p",
                                              "o", "g",  "s",  "mtllib", "usemtl", "cstype", "deg"};
     size_t n = 0;
-    if (*p == '#')
+    while (p < end && (*p == '#' || isspace(*p))) { /* comments are other texts' headings */
+        const unsigned char *line_end = *p == '#' ? memchr(p, '\n', (size_t)(end - p)) : p;
+        p = line_end ? line_end + 1 : end;
+    }
+    if (p == end)
         return 1;
     while (p + n < end && n < 8 && p[n] > ' ')
         n++;
@@ -125,8 +129,9 @@ static int by_text(const struct bytes *bytes, struct recognised *found)
     if (is_obj(p, end))
         return *found = certain(GROOM_FORMAT_OBJ), 1;
     return *found =
-               unknown("this is text, but neither JSON nor OBJ nor .tfx 2: \"{\", \"[\", \"v\", \"#\" or "
-                       "\"version\" was expected at byte 0"),
+               unknown("this is text, but no strand file: JSON begins with \"{\" or \"[\", OBJ with a statement like \"v\", "
+                       "TressFX with \"version\", PLY with \"ply\"; HAIR, .data, .bin, .npy and .npz, which are read too, "
+                       "are binary"),
            1;
 }
 

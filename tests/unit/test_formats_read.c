@@ -249,6 +249,8 @@ START_TEST(what_is_no_strand_file_is_said_to_be_so)
         {"Ogawa\xff", GROOM_EUNKNOWN, "Alembic"},
         {"#usda 1.0\n", GROOM_EUNKNOWN, "USD"},
         {"Dear Sir,\n", GROOM_EUNKNOWN, "text"},
+        {"# A read-me\n\nHair, and what to do with it.\n", GROOM_EUNKNOWN, "no strand file: JSON begins with"},
+        {"# only\n# remarks\n", GROOM_EFORMAT, "this is no strand file"},
         {" \n ", GROOM_EUNKNOWN, "white space"},
         {"\x89PNG\r\n\x1a\n and so on, for a while longer", GROOM_EUNKNOWN, "no strand format"},
         {"v 1 2 3\nf 1 1 1\n", GROOM_EFORMAT, "mesh"},
