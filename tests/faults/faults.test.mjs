@@ -1,5 +1,5 @@
-// Faults below the storage: each write, sync, rename, creation, truncation, removal and allocation of one script of
-// uploads, a job, edits and removals fails in turn. After each: the daemon lives, what was acknowledged is there, what
+// Faults below the storage: each write, sync, rename, creation, truncation, removal, allocation, read and start of a
+// process of one script of uploads, a job, edits and removals fails in turn. After each: the daemon lives, what was acknowledged is there, what
 // was refused was refused in good form, the script runs again as if nothing had been, and groomd check is clean.
 //
 // FAULTS=all takes every call (make test-service); else a sample of them.
@@ -51,6 +51,8 @@ async function script(daemon, told) {
   if (groom) {
     told.set(`/v1/grooms/${groom.json.groom}?revision=1`, 200);
     if (await step('PATCH', `/v1/grooms/${groom.json.groom}`, { headers: { ...merge, 'If-Match': '"1"' }, body: { name: 'x' } })) told.set(`/v1/grooms/${groom.json.groom}?revision=2`, 200);
+    await step('GET', `/v1/grooms/${groom.json.groom}/strands?format=ply`); // evaluated, written, sent
+    await step('GET', `/v1/grooms/${groom.json.groom}/analysis`);
   }
   if (daemon.token) {
     const work = (method, path, options) => step(method, `/v1/work/${path}`, { token: daemon.token, ...options });
@@ -128,8 +130,29 @@ async function measure(daemon, faults) {
 
 const plans = [
   ['write', 'EIO', 37], ['write', 'ENOSPC', 37], ['write', 0, 53], ['sync', 'EIO', 11], ['rename', 'EIO', 2], ['create', 'EMFILE', 5],
-  ['truncate', 'EIO', 2], ['remove', 'EACCES', 3], ...(slowness === 1 ? [['allocate', 'ENOMEM', 613]] : []),
+  ['truncate', 'EIO', 2], ['remove', 'EACCES', 3], ['read', 'EIO', 5], ['spawn', 'EAGAIN', 3], ...(slowness === 1 ? [['allocate', 'ENOMEM', 613]] : []),
 ];
+
+/** What a program or library defines, or takes from others. */
+async function symbols(path, which) {
+  const { status, stdout, stderr } = await run('nm', ['-D', `--${which}-only`, path]);
+  assert.equal(status, 0, stderr);
+  return stdout.split('\n').filter(Boolean).map((line) => line.split(' ').at(-1).replace(/@.*/, ''));
+}
+
+test('no call that changes the disk, takes memory or starts a process is left out', async (t) => {
+  const libraries = (await run('ldd', [join(build, 'groomd')])).stdout, where = (name) => new RegExp(`${name.replaceAll('.', '\\.')} => (\\S+)`).exec(libraries)[1];
+  const changes = /^(p?writev?(64)?(v2)?|pwritev?2?(64)?|f(data)?sync|syncfs|sync_file_range|msync|rename(at2?)?|link(at)?|symlink(at)?|unlink(at)?|remove|rmdir|mkdir(at)?|open(64)?|openat(64)?|creat(64)?|mkstemp(64)?|f?truncate(64)?|(posix_)?fallocate(64)?|copy_file_range|p?read(64)?|preadv?2?(64)?|fork|vfork|clone|posix_spawnp?|system|popen|pipe2?|malloc|calloc|realloc|reallocarray|aligned_alloc|posix_memalign|memalign|mmap(64)?|mremap)$/;
+  // SQLite maps nothing: its WAL's index is in memory that malloc gave (VFS unix-excl), PRAGMA mmap_size is 0
+  const elsewhere = new Set(['mmap64', 'mremap']);
+  const failing = new Set(await symbols(join(build, 'tests/libfault.so'), 'defined'));
+  const left = [];
+  for (const path of [join(build, 'groomd'), where('libsqlite3.so.0')])
+    left.push(...(await symbols(path, 'undefined')).filter((name) => changes.test(name) && !failing.has(name) && !elsewhere.has(name)));
+  const sanitized = slowness > 1 ? /^(malloc|calloc|realloc|aligned_alloc|posix_memalign|mmap)$/ : /^$/;
+  assert.deepEqual(left.filter((name) => !sanitized.test(name)), []);
+  t.diagnostic(`${[...failing].filter((name) => changes.test(name)).length} calls can be made to fail`);
+});
 
 test('each call fails in turn', async (t) => {
   const { daemon, faults } = await startFaultyDaemon(t);

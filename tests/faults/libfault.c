@@ -1,4 +1,5 @@
-/* Preloaded into groomd: makes the nth write, sync, rename, creation, truncation, removal or allocation fail.
+/* Preloaded into groomd: makes the nth write, sync, rename, creation, truncation, removal, allocation, read or start of
+ * a process fail.
  *
  * GROOM_FAULT names a file that a test maps as well (struct faults): it arms a fault there while the daemon runs, and
  * reads how many calls of each kind there were. Only regular files below GROOM_FAULT_FOLDER count, and only in a
@@ -17,7 +18,7 @@
 #include <sys/types.h>
 #include <unistd.h>
 
-enum kind { WRITE, SYNC, RENAME, CREATE, TRUNCATE, REMOVE, ALLOCATE, KINDS };
+enum kind { WRITE, SYNC, RENAME, CREATE, TRUNCATE, REMOVE, ALLOCATE, READ, SPAWN, KINDS };
 
 struct faults {
     _Atomic int32_t kind;   /* -1: none */
@@ -124,6 +125,23 @@ int fallocate(int fd, int mode, off_t at, off_t n)
     return is_ours(fd) && fails(TRUNCATE) ? -1 : REAL(fallocate)(fd, mode, at, n);
 }
 
+/* A hint to the kernel, whose failure must not matter. */
+int sync_file_range(int fd, off64_t at, off64_t n, unsigned flags)
+{
+    return is_ours(fd) && fails(SYNC) ? -1 : REAL(sync_file_range)(fd, at, n, flags);
+}
+
+ssize_t read(int fd, void *bytes, size_t n) { return is_ours(fd) && fails(READ) ? -1 : REAL(read)(fd, bytes, n); }
+ssize_t pread(int fd, void *bytes, size_t n, off_t at) { return is_ours(fd) && fails(READ) ? -1 : REAL(pread)(fd, bytes, n, at); }
+ssize_t pread64(int fd, void *bytes, size_t n, off64_t at)
+{
+    return is_ours(fd) && fails(READ) ? -1 : REAL(pread64)(fd, bytes, n, at);
+}
+
+int mkdir(const char *path, mode_t mode) { return faults && fails(CREATE) ? -1 : REAL(mkdir)(path, mode); }
+int mkdirat(int fd, const char *path, mode_t mode) { return faults && fails(CREATE) ? -1 : REAL(mkdirat)(fd, path, mode); }
+int rmdir(const char *path) { return faults && fails(REMOVE) ? -1 : REAL(rmdir)(path); }
+int remove(const char *path) { return faults && fails(REMOVE) ? -1 : REAL(remove)(path); }
 int unlink(const char *path) { return faults && fails(REMOVE) ? -1 : REAL(unlink)(path); }
 int unlinkat(int fd, const char *path, int flags) { return faults && fails(REMOVE) ? -1 : REAL(unlinkat)(fd, path, flags); }
 
@@ -156,12 +174,18 @@ int openat(int at, const char *path, int flags, ...)
     return REAL(openat)(at, path, flags, mode);
 }
 
+/* --- processes ------------------------------------------------------------------------------- */
+
+pid_t fork(void) { return faults && fails(SPAWN) ? -1 : REAL(fork)(); }
+int pipe2(int ends[2], int flags) { return faults && fails(SPAWN) ? -1 : REAL(pipe2)(ends, flags); }
+
 /* --- memory ---------------------------------------------------------------------------------- */
 
 #ifndef WITHOUT_ALLOCATOR /* a sanitizer has its own */
 void *__libc_malloc(size_t n);
 void *__libc_calloc(size_t n, size_t size);
 void *__libc_realloc(void *old, size_t n);
+void *__libc_memalign(size_t alignment, size_t n);
 
 static int memory_is_out(void)
 {
@@ -173,5 +197,10 @@ static int memory_is_out(void)
 
 void *malloc(size_t n) { return memory_is_out() ? NULL : __libc_malloc(n); }
 void *calloc(size_t n, size_t size) { return memory_is_out() ? NULL : __libc_calloc(n, size); }
+void *aligned_alloc(size_t alignment, size_t n) { return memory_is_out() ? NULL : __libc_memalign(alignment, n); }
+void *mmap(void *at, size_t n, int protection, int flags, int fd, off_t offset)
+{
+    return memory_is_out() ? MAP_FAILED : REAL(mmap)(at, n, protection, flags, fd, offset);
+}
 void *realloc(void *old, size_t n) { return memory_is_out() ? NULL : __libc_realloc(old, n); }
 #endif

@@ -6,7 +6,7 @@ import { mkdtempSync, rmSync } from 'node:fs';
 import { build } from './daemon.mjs';
 import { startIdleDaemon } from './api.mjs';
 
-export const kinds = ['write', 'sync', 'rename', 'create', 'truncate', 'remove', 'allocate'];
+export const kinds = ['write', 'sync', 'rename', 'create', 'truncate', 'remove', 'allocate', 'read', 'spawn'];
 const SIZE = 32 + 8 * kinds.length;
 
 export class Faults {
