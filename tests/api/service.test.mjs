@@ -131,6 +131,31 @@ test('malformed HTTP gets a refusal or a closed line, and the service goes on', 
   await expect(daemon, 200, 'GET', '/healthz');
 });
 
+test('what libmicrohttpd refuses before groomd hears of it: a fixed page that repeats nothing, and the end of the line', async (t) => {
+  const daemon = await startDaemon(t), post = 'POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\n', mark = 'secret<script>';
+  // It has no hook for these; all else that is malformed gets groomd's problem.
+  const theirs = {
+    505: [`GET /${mark} HTTP/9.9\r\n\r\n`, 'PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n'],
+    414: [`GET /${mark}${'a'.repeat(300000)} HTTP/1.1\r\nHost: localhost\r\n\r\n`],
+    431: [`GET / HTTP/1.1\r\nHost: localhost\r\nX: ${mark}${'a'.repeat(200000)}\r\n\r\n`, `GET / HTTP/1.1\r\nHost: localhost\r\n${'A: b\r\n'.repeat(40000)}\r\n`],
+    400: [`${post}Content-Length: -1\r\n\r\n`, `${post}Transfer-Encoding: chunked\r\n\r\nzz${mark}\r\n\r\n`, `GET / HTTP/1.1\r\nHost: localhost\r\n${mark}\r\n\r\n`, `GET /${mark}\r\n\r\n`],
+    413: [`${post}Content-Length: 99999999999999999999999\r\n\r\n`, `${post}Transfer-Encoding: chunked\r\n\r\n10000000000000002\r\n{}\r\n0\r\n\r\n`],
+  };
+  for (const [status, requests] of Object.entries(theirs))
+    for (const bytes of requests) {
+      const answer = await raw(daemon, bytes, 4000);
+      assert.match(answer, new RegExp(`^HTTP/1\\.1 ${status} [^]*Connection: close[^]*\r\n\r\n<html><head><title>[^<]*</title></head><body>[^]{1,150}</body></html>$`), JSON.stringify(bytes.slice(0, 80)));
+      assert.ok(!answer.includes('secret'), answer);
+    }
+  const ours = {
+    400: ['GET / HTTP/1.1\r\n\r\n', `GET /%zz${mark} HTTP/1.1\r\nHost: localhost\r\n\r\n`, `${post}Content-Length: 3\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n`],
+    414: [`GET /${'a'.repeat(9000)} HTTP/1.1\r\nHost: localhost\r\n\r\n`],
+    405: [`${'M'.repeat(200)} / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n`],
+  };
+  for (const [status, requests] of Object.entries(ours))
+    for (const bytes of requests) assert.match(await raw(daemon, bytes, 4000), new RegExp(`^HTTP/1\\.1 ${status} [^]*application/problem\\+json`), JSON.stringify(bytes.slice(0, 80)));
+});
+
 test('slow senders are cut, others are not', async (t) => {
   const daemon = await startDaemon(t, { args: ['--head-timeout', '1', '--idle-timeout', '2', '--min-rate', '100'] });
   const wait = 8000 * slowness;
