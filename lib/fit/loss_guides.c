@@ -1,7 +1,5 @@
 #include "fit/loss_guides.h"
 
-#include <string.h>
-
 #include "base/memory.h"
 
 #define STRANDS_AT_ONCE 4096
@@ -9,9 +7,10 @@
 struct groom loss_guides_mean(const struct groom *groom, struct groom_operator operators[GROOM_FIT_MAX_OPERATORS])
 {
     struct groom mean = *groom;
-    memcpy(operators, groom->operators, groom->n_operators * sizeof *operators);
-    for (uint32_t o = 0; o < groom->n_operators; o++)
+    for (uint32_t o = 0; o < groom->n_operators; o++) { /* there may be none, and then no array either */
+        operators[o] = groom->operators[o];
         operators[o].enabled &= operators[o].type == GROOM_OPERATOR_CLUMP;
+    }
     mean.operators = operators;
     return mean;
 }
