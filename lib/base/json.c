@@ -13,3 +13,11 @@ cJSON *json_number(double value)
     }
     return cJSON_CreateRaw(text);
 }
+
+int json_put(cJSON *object, const char *name, cJSON *item)
+{
+    if (item && cJSON_AddItemToObject(object, name, item))
+        return 1;
+    cJSON_Delete(item);
+    return 0;
+}

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "fit/checksum.h"
+#include "base/checksum.h"
 #include "fit/state.h"
 
 #define MOST_GUIDES 10000 /* that options can ask for */

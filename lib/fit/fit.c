@@ -4,7 +4,7 @@
 
 #include "base/memory.h"
 #include "base/progress.h"
-#include "fit/checksum.h"
+#include "base/checksum.h"
 #include "fit/state.h"
 #include "fit/unseen.h"
 #include "groom/mesh.h"

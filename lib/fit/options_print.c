@@ -8,15 +8,6 @@
 #include "fit/state.h"
 #include "geometry/camera_json.h"
 
-/* Puts item into object; takes it also where that fails. */
-static int put(cJSON *object, const char *name, cJSON *item)
-{
-    if (item && cJSON_AddItemToObject(object, name, item))
-        return 1;
-    cJSON_Delete(item);
-    return 0;
-}
-
 static int append(cJSON *array, cJSON *item)
 {
     if (item && cJSON_AddItemToArray(array, item))
@@ -91,7 +82,7 @@ static cJSON *group_json(const struct groom_fit_options *options, const char *gr
     cJSON *json = cJSON_CreateObject();
     for (size_t i = 0; json && i < options_n_rows; i++) {
         const char *name = options_member(options_table[i].path, group);
-        if (name && !put(json, name, value_json(options, &options_table[i]))) {
+        if (name && !json_put(json, name, value_json(options, &options_table[i]))) {
             cJSON_Delete(json);
             return NULL;
         }
@@ -165,7 +156,7 @@ static int put_operators(cJSON *schema)
     cJSON *array = cJSON_CreateObject();
     if (array && put_text(array, "type", "array") &&
         cJSON_AddNumberToObject(array, "maxItems", GROOM_FIT_MAX_OPERATORS) &&
-        put(array, "items", names_schema(operator_name, GROOM_OPERATOR_COUNT)))
+        json_put(array, "items", names_schema(operator_name, GROOM_OPERATOR_COUNT)))
         return put_alternatives(schema, array, constant("auto"));
     cJSON_Delete(array);
     return 0;
@@ -199,7 +190,7 @@ static int put_cameras(cJSON *schema)
         ",\"cameras_txt\":{\"type\":\"string\"},\"images_txt\":{\"type\":\"string\"}}}";
     cJSON *list = cJSON_CreateObject(), *forms = cJSON_AddArrayToObject(schema, "oneOf");
     int whole = list && put_text(list, "type", "array") && cJSON_AddNumberToObject(list, "maxItems", GROOM_FIT_MAX_CAMERAS) &&
-                put(list, "items", cJSON_Parse(camera));
+                json_put(list, "items", cJSON_Parse(camera));
     if (!forms || !whole) {
         cJSON_Delete(list);
         return 0;
@@ -223,7 +214,7 @@ static int absorb(cJSON *into, cJSON *from)
         cJSON *item = cJSON_DetachItemViaPointer(from, from->child);
         char name[64];
         snprintf(name, sizeof name, "%s", item->string);
-        whole = put(into, name, item);
+        whole = json_put(into, name, item);
     }
     cJSON_Delete(from);
     return whole;
@@ -276,7 +267,7 @@ static cJSON *row_schema(const struct option_row *row, const struct groom_fit_op
     describe(row, text, sizeof text);
     if (schema && put_text(schema, "description", text) && put_kind(schema, row) &&
         (row->type == OPTION_GROUP || row->type == OPTION_CAMERAS ||
-         put(schema, "default", value_json(defaults, row))))
+         json_put(schema, "default", value_json(defaults, row))))
         return schema;
     cJSON_Delete(schema);
     return NULL;
@@ -293,7 +284,7 @@ static cJSON *group_schema(const char *group)
     for (size_t i = 0; whole && i < options_n_rows; i++) {
         const char *name = options_member(options_table[i].path, group);
         if (name)
-            whole = put(properties, name, row_schema(&options_table[i], &defaults));
+            whole = json_put(properties, name, row_schema(&options_table[i], &defaults));
     }
     if (whole)
         return schema;

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "fit/checkpoint.h"
-#include "fit/checksum.h"
+#include "base/checksum.h"
 #include "fit/state.h"
 #include "groom/strands.h"
 

@@ -1,4 +1,4 @@
-#include "fit/checksum.h"
+#include "base/checksum.h"
 
 #include <string.h>
 

@@ -1,7 +1,7 @@
 /* A 64-bit checksum against accidents (not against forgers), 8 bytes at a time. It depends on the
  * bytes in their order, not on how they were cut into calls. */
-#ifndef FIT_CHECKSUM_H
-#define FIT_CHECKSUM_H
+#ifndef BASE_CHECKSUM_H
+#define BASE_CHECKSUM_H
 
 #include <stddef.h>
 #include <stdint.h>

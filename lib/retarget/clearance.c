@@ -1,0 +1,177 @@
+/* The exact last pass: iterations hold half-spaces of the surface as it was seen from where particles came;
+ * here everything is looked at where it is. */
+#include <math.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "geometry/vec.h"
+#include "retarget/job.h"
+
+#define PIECE 64             /* strands */
+#define ROUNDS 60
+#define ROUNDS_GENTLE 12     /* after these each push goes farther than the one before: out of creases */
+#define BEYOND 1.001         /* pushed to so many clearances, so that what was pushed is clear */
+#define ROOT_SEGMENT 0.25    /* share of the clearance for the middle of a segment that begins on the surface */
+
+/* Where a point is: how far outside (negative inside) and which way leads out. */
+struct place {
+    double outside;
+    struct vec out;
+};
+
+/* Distances of points that are surely more than `enough` outside are not asked for: INFINITY. */
+static struct place place_of(const struct job *job, const float p[3], double enough)
+{
+    struct groom_surface_point near;
+    struct place place = {INFINITY, {0, 0, 0}};
+    if (field_away(&job->field, p) > enough || !groom_bvh_closest(job->bvh, p, INFINITY, &near))
+        return place;
+    struct vec d = vec_sub(vec_of(p), vec_of(near.position)), normal = vec_of(near.normal);
+    double distance = vec_length(d);
+    int inside = groom_bvh_inside(job->bvh, p);
+    place.outside = inside ? -distance : distance;
+    place.out = distance > 1e-7 ? vec_scale(d, (inside ? -1 : 1) / distance) : normal;
+    return place;
+}
+
+static void push(float p[3], struct vec out, double way)
+{
+    p[0] = (float)(p[0] + way * out.x);
+    p[1] = (float)(p[1] + way * out.y);
+    p[2] = (float)(p[2] + way * out.z);
+}
+
+static void middle(const float a[3], const float b[3], float out[3])
+{
+    for (int c = 0; c < 3; c++)
+        out[c] = 0.5f * (a[c] + b[c]);
+}
+
+/* --- pushing -------------------------------------------------------------------------------- */
+
+static int clear_vertices(const struct job *job, float (*p)[3], uint32_t n, double effort)
+{
+    double clearance = job->options->clearance;
+    int n_pushed = 0;
+    for (uint32_t i = 1; i < n; i++) {
+        struct place place = place_of(job, p[i], clearance);
+        if (place.outside >= clearance)
+            continue;
+        push(p[i], place.out, effort * (BEYOND * clearance - place.outside));
+        n_pushed++;
+    }
+    return n_pushed;
+}
+
+static int clear_middles(const struct job *job, float (*p)[3], uint32_t n, double effort)
+{
+    int n_pushed = 0;
+    for (uint32_t i = 0; i + 1 < n; i++) {
+        double wanted = job->options->clearance * (i ? 1 : ROOT_SEGMENT), way;
+        float m[3];
+        middle(p[i], p[i + 1], m);
+        struct place place = place_of(job, m, wanted);
+        if (place.outside >= wanted)
+            continue;
+        way = effort * (BEYOND * wanted - place.outside);
+        if (i)
+            push(p[i], place.out, way);
+        push(p[i + 1], place.out, i ? way : 2 * way);
+        n_pushed++;
+    }
+    return n_pushed;
+}
+
+/* Whether the strand can be anywhere near: one look at each vertex, as most strands need no more. */
+static int may_touch(const struct job *job, const float (*p)[3], uint32_t n)
+{
+    for (uint32_t i = 0; i + 1 < n; i++) {
+        double half = vec_length(vec_sub(vec_of(p[i + 1]), vec_of(p[i]))) / 2;
+        if (field_away(&job->field, p[i + 1]) <= job->options->clearance + half)
+            return 1;
+    }
+    return 0;
+}
+
+static void clear_strand(const struct job *job, float (*p)[3], uint32_t n)
+{
+    if (!may_touch(job, (const float(*)[3])p, n))
+        n = 2; /* but for the segment at the root */
+    for (int round = 0; round < ROUNDS; round++) {
+        double effort = round < ROUNDS_GENTLE ? 1 : 1 + 0.25 * (round - ROUNDS_GENTLE);
+        int n_pushed = clear_vertices(job, p, n, effort);
+        n_pushed += clear_middles(job, p, n, effort);
+        if (n_pushed == 0)
+            break;
+    }
+}
+
+struct clearing {
+    struct job *job;
+    float (*points)[3];
+    const float (*counted)[3];
+    struct groom_retarget_inside *inside; /* [pieces] */
+};
+
+static void clear_piece(void *user, uint32_t piece, uint32_t thread)
+{
+    struct clearing *clearing = user;
+    const struct groom_strands *strands = clearing->job->source->strands;
+    (void)thread;
+    for (uint32_t i = piece * PIECE; i < strands->n_strands && i - piece * PIECE < PIECE; i++)
+        clear_strand(clearing->job, clearing->points + strands->first[i], strands->first[i + 1] - strands->first[i]);
+}
+
+groom_status clearance_apply(struct job *job, float (*points)[3], struct groom_diag *diag)
+{
+    struct clearing clearing = {.job = job, .points = points};
+    (void)diag;
+    parallel_for(job->context, job->source->strands->n_strands / PIECE + 1, clear_piece, &clearing);
+    return GROOM_OK;
+}
+
+/* --- counting ---------------------------------------------------------------------------------- */
+
+static void count_strand(const struct job *job, const float (*p)[3], uint32_t n, struct groom_retarget_inside *inside)
+{
+    for (uint32_t i = 0; i + 1 < n; i++) {
+        float m[3];
+        middle(p[i], p[i + 1], m);
+        struct place at = place_of(job, p[i + 1], job->options->clearance), between = place_of(job, m, 0);
+        inside->near_vertices += at.outside < job->options->clearance;
+        inside->vertices += at.outside < 0;
+        inside->segments += between.outside < 0;
+        inside->deepest = fmax(inside->deepest, -at.outside);
+    }
+}
+
+static void count_piece(void *user, uint32_t piece, uint32_t thread)
+{
+    struct clearing *clearing = user;
+    const struct groom_strands *strands = clearing->job->source->strands;
+    (void)thread;
+    clearing->inside[piece] = (struct groom_retarget_inside){0};
+    for (uint32_t i = piece * PIECE; i < strands->n_strands && i - piece * PIECE < PIECE; i++)
+        count_strand(clearing->job, clearing->counted + strands->first[i], strands->first[i + 1] - strands->first[i],
+                     &clearing->inside[piece]);
+}
+
+groom_status clearance_count(struct job *job, const float (*points)[3], struct groom_retarget_inside *inside,
+                             struct groom_diag *diag)
+{
+    uint32_t n_pieces = job->source->strands->n_strands / PIECE + 1;
+    struct clearing clearing = {.job = job, .counted = points};
+    if (!(clearing.inside = memory_array(job->allocator, n_pieces, sizeof *clearing.inside)))
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to count what is inside");
+    parallel_for(job->context, n_pieces, count_piece, &clearing);
+    *inside = (struct groom_retarget_inside){0};
+    for (uint32_t i = 0; i < n_pieces; i++) {
+        inside->vertices += clearing.inside[i].vertices;
+        inside->segments += clearing.inside[i].segments;
+        inside->near_vertices += clearing.inside[i].near_vertices;
+        inside->deepest = fmax(inside->deepest, clearing.inside[i].deepest);
+    }
+    memory_release(job->allocator, clearing.inside, n_pieces, sizeof *clearing.inside);
+    return GROOM_OK;
+}

@@ -1,0 +1,412 @@
+/* groom_retarget_run: initial transfer, coarse scale, fine scale, the exact last pass, the report. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "base/progress.h"
+#include "groom/body.h"
+#include "retarget/job.h"
+
+#define FIELD_NODES 400000
+#define PIECE 256 /* strands */
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* --- checks ---------------------------------------------------------------------------------- */
+
+static groom_status check_target(const struct groom_retarget_source *source, const struct groom_retarget_target *target,
+                                 struct groom_diag *diag)
+{
+    const struct groom_mesh *from = source->body, *to = target->body;
+    groom_status st = groom_mesh_validate(to, diag);
+    if (st != GROOM_OK)
+        return st;
+    if (from->n_vertices != to->n_vertices || from->n_triangles != to->n_triangles ||
+        memcmp(from->triangles, to->triangles, from->n_triangles * sizeof *from->triangles) != 0) {
+        char difference[160];
+        int same = groom_topology_same(from, to, difference);
+        return groom_fail(diag, GROOM_EINVAL, "the target's triangles are not those of the source (%s); lay the source's mesh over the target first",
+                          same ? "their corners stand in another order" : difference);
+    }
+    if (target->skeleton->n_bones != source->skeleton.n_bones)
+        return groom_fail_field(diag, GROOM_EINVAL, "/bones", "the target's skeleton has %u bones, the source's %u",
+                                target->skeleton->n_bones, source->skeleton.n_bones);
+    for (uint32_t i = 0; target->roots && i < source->strands->n_strands; i++)
+        for (int c = 0; c < 3; c++)
+            if (!isfinite(target->roots[i][c]))
+                return groom_fail(diag, GROOM_EINVAL, "the new root of strand %u is not finite", i);
+    return GROOM_OK;
+}
+
+static groom_status check_run(const struct groom_retarget_source *source, const struct groom_retarget_options *options,
+                              struct groom_diag *diag)
+{
+    groom_status st = retarget_options_check(options, diag);
+    if (st != GROOM_OK)
+        return st;
+    if (options->mode != source->options.mode)
+        return groom_fail_field(diag, GROOM_EINVAL, "/mode", "the source was prepared for the other mode");
+    if (options->sweeps > 0 && source_has_fine(source) && source->among_all.k == 0)
+        return groom_fail_field(diag, GROOM_EINVAL, "/sweeps", "the source was prepared without sweeps");
+    return GROOM_OK;
+}
+
+/* --- the job -------------------------------------------------------------------------------------- */
+
+/* How far a strand of the source is from its root at most: no strand of the target will be much farther. */
+static void hair_box(const struct groom_retarget_source *source, const struct groom_mesh *body, float low[3], float high[3])
+{
+    float was[2][3], is[2][3];
+    groom_mesh_bounds(source->body, was[0], was[1]);
+    groom_mesh_bounds(body, is[0], is[1]);
+    for (int c = 0; c < 3; c++) {
+        float least = INFINITY, most = -INFINITY;
+        for (uint32_t i = 0; i < source->strands->n_vertices; i++) {
+            least = fminf(least, source->strands->points[i][c]);
+            most = fmaxf(most, source->strands->points[i][c]);
+        }
+        float size = was[1][c] - was[0][c], scale = size > 0 ? (is[1][c] - is[0][c]) / size : 1;
+        low[c] = is[0][c] + (least - was[0][c]) * scale;
+        high[c] = is[0][c] + (most - was[0][c]) * scale;
+    }
+}
+
+groom_status job_init(struct job *job, const struct groom_retarget_source *source,
+                      const struct groom_retarget_target *target, const struct groom_retarget_options *options,
+                      const struct groom_context *context, struct groom_retarget_report *report, struct groom_diag *diag)
+{
+    uint32_t n_nodes = source->strands->n_vertices / 8 < FIELD_NODES ? source->strands->n_vertices / 8 + 1000 : FIELD_NODES;
+    float low[3], high[3];
+    groom_status st;
+    *job = (struct job){.source = source, .target = target, .options = options, .context = context, .report = report,
+                        .allocator = memory_allocator(context)};
+    source_centre(target->body, job->centre);
+    if ((st = groom_bvh_create(target->body, context, &job->bvh, diag)) != GROOM_OK)
+        return st;
+    hair_box(source, target->body, low, high);
+    if ((st = field_init(&job->field, job->bvh, low, high, 0.05f, n_nodes, context, diag)) != GROOM_OK)
+        return st;
+    job->hat = memory_array(job->allocator, source->strands->n_vertices, sizeof *job->hat);
+    if (target->roots)
+        job->shift = memory_array(job->allocator, source->strands->n_strands, sizeof *job->shift);
+    return job->hat && (job->shift || !target->roots)
+               ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to retarget %u particles", source->strands->n_vertices);
+}
+
+void job_finish(struct job *job)
+{
+    const struct groom_strands *strands = job->source->strands;
+    memory_release(job->allocator, job->hat, strands->n_vertices, sizeof *job->hat);
+    memory_release(job->allocator, job->shift, strands->n_strands, sizeof *job->shift);
+    field_finish(&job->field);
+    groom_bvh_destroy(job->bvh);
+}
+
+/* --- strands that are adapted together ---------------------------------------------------------------- */
+
+/* Copies of some strands, one after the other. */
+struct gathered {
+    struct coupled hair;
+    uint32_t *first;
+    float (*rest)[3], (*hat)[3], *gamma;
+};
+
+static void gathered_finish(struct gathered *g, const struct groom_allocator *allocator)
+{
+    uint32_t n = g->hair.n;
+    memory_release(allocator, g->first, (size_t)g->hair.n_strands + 1, sizeof *g->first);
+    memory_release(allocator, g->rest, n, sizeof *g->rest);
+    memory_release(allocator, g->hat, n, sizeof *g->hat);
+    memory_release(allocator, g->gamma, n, sizeof *g->gamma);
+    memory_release(allocator, g->hair.p, n, sizeof *g->hair.p);
+}
+
+static void gather_strand(const struct job *job, struct gathered *g, uint32_t index, uint32_t strand)
+{
+    const struct groom_strands *strands = job->source->strands;
+    const float *shift = job->shift ? job->shift[strand] : NULL;
+    uint32_t from = strands->first[strand], n = strands->first[strand + 1] - from, to = g->first[index];
+    double arc = 0, travel = 0;
+    for (int c = 0; shift && c < 3; c++)
+        travel += (double)shift[c] * shift[c];
+    for (uint32_t i = 0; i < n; i++) {
+        double gamma = adaptive_weight(arc, sqrt(travel), job->options->sigma_root), square = 0;
+        for (int c = 0; c < 3; c++) {
+            g->rest[to + i][c] = (float)(strands->points[from + i][c] - job->source->centre[c]);
+            g->hat[to + i][c] = job->hat[from + i][c];
+            g->hair.p[to + i][c] = (float)(job->hat[from + i][c] + (shift ? (1 - gamma) * shift[c] : 0));
+            double d = i + 1 < n ? (double)strands->points[from + i + 1][c] - strands->points[from + i][c] : 0;
+            square += d * d;
+        }
+        if (g->gamma)
+            g->gamma[to + i] = (float)gamma;
+        arc += sqrt(square);
+    }
+}
+
+/* which [n_strands]: their indices, or NULL: all. */
+static groom_status gather(const struct job *job, const uint32_t *which, uint32_t n_strands, const struct graph *graph,
+                           struct gathered *g, struct groom_diag *diag)
+{
+    const struct groom_strands *strands = job->source->strands;
+    uint32_t n = 0;
+    *g = (struct gathered){0};
+    for (uint32_t i = 0; i < n_strands; i++) {
+        uint32_t strand = which ? which[i] : i;
+        n += strands->first[strand + 1] - strands->first[strand];
+    }
+    g->hair = (struct coupled){.n_strands = n_strands, .n = n, .graph = graph};
+    g->first = memory_array(job->allocator, (size_t)n_strands + 1, sizeof *g->first);
+    g->rest = memory_array(job->allocator, n, sizeof *g->rest);
+    g->hat = memory_array(job->allocator, n, sizeof *g->hat);
+    g->gamma = job->shift ? memory_array(job->allocator, n, sizeof *g->gamma) : NULL;
+    g->hair.p = memory_array(job->allocator, n, sizeof *g->hair.p);
+    if (!g->first || !g->rest || !g->hat || (job->shift && !g->gamma) || !g->hair.p)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to adapt %u particles together", n);
+    g->first[0] = 0;
+    for (uint32_t i = 0; i < n_strands; i++) {
+        uint32_t strand = which ? which[i] : i;
+        g->first[i + 1] = g->first[i] + strands->first[strand + 1] - strands->first[strand];
+        gather_strand(job, g, i, strand);
+    }
+    g->hair.first = g->first;
+    g->hair.rest = (const float(*)[3])g->rest;
+    g->hair.hat = (const float(*)[3])g->hat;
+    g->hair.gamma = g->gamma;
+    return GROOM_OK;
+}
+
+static void scatter(const struct job *job, const uint32_t *which, const struct coupled *hair, float (*result)[3])
+{
+    for (uint32_t i = 0; i < hair->n_strands; i++) {
+        uint32_t to = job->source->strands->first[which ? which[i] : i];
+        memcpy(result + to, hair->p + hair->first[i], (hair->first[i + 1] - hair->first[i]) * sizeof *result);
+    }
+}
+
+static void add(struct groom_retarget_energy *sum, const struct groom_retarget_energy *one)
+{
+    sum->shape += one->shape;
+    sum->inter += one->inter;
+    sum->body += one->body;
+    sum->total += one->total;
+}
+
+/* --- the two modes ---------------------------------------------------------------------------------------- */
+
+static groom_status adapt_together(struct job *job, const uint32_t *which, uint32_t n_strands, const struct graph *graph,
+                                   float (*result)[3], struct gathered *g, struct groom_diag *diag)
+{
+    struct groom_retarget_report *report = job->report;
+    groom_status st = gather(job, which, n_strands, graph, g, diag);
+    if (st == GROOM_OK)
+        st = coupled_energy(job, &g->hair, g->hair.hat, &report->before, diag);
+    if (st == GROOM_OK)
+        st = coupled_solve(job, &g->hair, job->options->iterations, &report->iterations_coarse, report->coarse, diag);
+    if (st == GROOM_OK)
+        st = coupled_energy(job, &g->hair, (const float(*)[3])g->hair.p, &report->after, diag);
+    if (st == GROOM_OK)
+        scatter(job, which, &g->hair, result);
+    return st;
+}
+
+/* How far each particle of the guides went; over what was their rest. */
+static void guides_moved(struct gathered *g)
+{
+    for (uint32_t i = 0; i < g->hair.n; i++)
+        for (int c = 0; c < 3; c++)
+            g->rest[i][c] = g->hair.p[i][c] - g->rest[i][c];
+}
+
+static groom_status adapt_fine(struct job *job, struct gathered *guides, float (*result)[3], struct groom_diag *diag)
+{
+    struct groom_retarget_energy before, after;
+    const float(*moved)[3] = (const float(*)[3])guides->rest;
+    guides_moved(guides);
+    groom_status st = fine_energy(job, moved, (const float(*)[3])job->hat, &before, diag);
+    if (st == GROOM_OK)
+        st = fine_solve(job, moved, result, &after, diag);
+    if (st == GROOM_OK) {
+        add(&job->report->before, &before);
+        add(&job->report->after, &after);
+    }
+    return st;
+}
+
+groom_status job_adapt(struct job *job, float (*result)[3], struct groom_diag *diag)
+{
+    const struct groom_retarget_source *source = job->source;
+    int global = job->options->mode == GROOM_RETARGET_GLOBAL;
+    struct gathered g;
+    double start = now();
+    job->progress_from = 0.1f;
+    job->progress_to = global ? 0.9f : 0.2f;
+    groom_status st = global ? adapt_together(job, NULL, source->strands->n_strands, &source->among_all, result, &g, diag)
+                             : adapt_together(job, source->guides, source->n_guides, &source->among_guides, result, &g, diag);
+    job->report->seconds_coarse = now() - start;
+    job->progress_from = 0.2f;
+    job->progress_to = 0.9f;
+    start = now();
+    if (st == GROOM_OK && source_has_fine(source))
+        st = adapt_fine(job, &g, result, diag);
+    job->report->seconds_fine = now() - start;
+    gathered_finish(&g, job->allocator);
+    return st;
+}
+
+/* --- the result ------------------------------------------------------------------------------------------ */
+
+/* From relative to the centre to metres; a root of its own is kept to the bit. */
+static void to_metres(const struct job *job, float (*points)[3])
+{
+    const struct groom_strands *strands = job->source->strands;
+    for (uint32_t i = 0; i < strands->n_vertices; i++)
+        for (int c = 0; c < 3; c++)
+            points[i][c] = (float)(points[i][c] + job->centre[c]);
+    for (uint32_t i = 0; job->shift && i < strands->n_strands; i++)
+        memcpy(points[strands->first[i]], job->target->roots[i], sizeof *points);
+}
+
+static int compare_floats(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return x < y ? -1 : x > y;
+}
+
+static groom_status measure_lengths(const struct job *job, const float (*points)[3], struct groom_diag *diag)
+{
+    const struct groom_strands *strands = job->source->strands;
+    struct groom_retarget_report *report = job->report;
+    float *ratio = memory_array(job->allocator, strands->n_strands, sizeof *ratio);
+    if (!ratio)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to measure lengths");
+    for (uint32_t i = 0; i < strands->n_strands; i++) {
+        uint32_t first = strands->first[i], n = strands->first[i + 1] - first;
+        double was = groom_polyline_length((const float(*)[3])strands->points + first, n);
+        ratio[i] = was > 0 ? (float)(groom_polyline_length(points + first, n) / was) : 1;
+    }
+    qsort(ratio, strands->n_strands, sizeof *ratio, compare_floats);
+    report->length_ratio_min = ratio[0];
+    report->length_ratio_median = ratio[strands->n_strands / 2];
+    report->length_ratio_max = ratio[strands->n_strands - 1];
+    memory_release(job->allocator, ratio, strands->n_strands, sizeof *ratio);
+    return GROOM_OK;
+}
+
+static double distance(const float a[3], const float b[3])
+{
+    double sum = 0;
+    for (int c = 0; c < 3; c++)
+        sum += ((double)a[c] - b[c]) * ((double)a[c] - b[c]);
+    return sqrt(sum);
+}
+
+static void fill_values(const struct job *job, const float (*points)[3], const struct groom_retarget_values *values)
+{
+    const struct groom_strands *strands = job->source->strands;
+    double sum = 0, most = 0;
+    for (uint32_t s = 0; s < strands->n_strands; s++)
+        for (uint32_t i = strands->first[s]; i < strands->first[s + 1]; i++) {
+            float hat[3];
+            for (int c = 0; c < 3; c++)
+                hat[c] = (float)(job->hat[i][c] + job->centre[c]);
+            double way = distance(points[i], hat);
+            sum += way;
+            most = fmax(most, way);
+            if (values && values->movement)
+                values->movement[i] = (float)way;
+            if (values && values->depth) {
+                float away = field_away(&job->field, hat);
+                away = away > job->options->clearance ? away : groom_bvh_signed_distance(job->bvh, hat);
+                values->depth[i] = i > strands->first[s] ? fmaxf(0, (float)job->options->clearance - away) : 0;
+            }
+            if (values && values->stretch) {
+                double was = i > strands->first[s] ? distance(strands->points[i], strands->points[i - 1]) : 0;
+                values->stretch[i] = was > 0 ? (float)(distance(points[i], points[i - 1]) / was) : 1;
+            }
+        }
+    job->report->movement_mean = sum / strands->n_vertices;
+    job->report->movement_max = most;
+}
+
+static groom_status finish(struct job *job, float (*points)[3], const struct groom_retarget_values *values,
+                           struct groom_diag *diag)
+{
+    double start = now();
+    groom_status st;
+    to_metres(job, points);
+    if ((st = clearance_apply(job, points, diag)) != GROOM_OK)
+        return st;
+    job->report->seconds_clearance = now() - start;
+    if ((st = clearance_count(job, (const float(*)[3])points, &job->report->inside_after, diag)) != GROOM_OK)
+        return st;
+    fill_values(job, (const float(*)[3])points, values);
+    return measure_lengths(job, (const float(*)[3])points, diag);
+}
+
+/* What the initial transfer has inside; `room` is lent for it. */
+static groom_status count_before(struct job *job, float (*room)[3], struct groom_diag *diag)
+{
+    for (uint32_t i = 0; i < job->source->strands->n_vertices; i++)
+        for (int c = 0; c < 3; c++)
+            room[i][c] = (float)(job->hat[i][c] + job->centre[c]);
+    return clearance_count(job, (const float(*)[3])room, &job->report->inside_before, diag);
+}
+
+groom_status groom_retarget_run(const struct groom_retarget_source *source, const struct groom_retarget_target *target,
+                                const struct groom_retarget_options *options, const struct groom_context *context,
+                                float (*out)[3], const struct groom_retarget_values *values,
+                                struct groom_retarget_report *report_out, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    struct groom_retarget_report *report = NULL;
+    struct job job = {.source = source, .allocator = allocator};
+    double start = now();
+    groom_status st;
+    if ((st = check_run(source, options, diag)) != GROOM_OK || (st = check_target(source, target, diag)) != GROOM_OK)
+        return st;
+    if (!(report = memory_array_zero(allocator, 1, sizeof *report)))
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to retarget");
+    report->n_strands = source->strands->n_strands;
+    report->n_vertices = source->strands->n_vertices;
+    report->n_guides = source->n_guides;
+    report->n_without_bone = source->n_without_bone;
+    if ((st = job_init(&job, source, target, options, context, report, diag)) != GROOM_OK ||
+        (st = transfer_all(&job, diag)) != GROOM_OK || (st = count_before(&job, out, diag)) != GROOM_OK)
+        goto out;
+    report->seconds_initial = now() - start;
+    progress_report(context, 0.1);
+    if ((st = job_adapt(&job, out, diag)) != GROOM_OK || (st = finish(&job, out, values, diag)) != GROOM_OK)
+        goto out;
+    report->seconds_total = now() - start;
+    progress_report(context, 1.0);
+    if (report_out)
+        *report_out = *report;
+out:
+    job_finish(&job);
+    memory_release(allocator, report, 1, sizeof *report);
+    return st;
+}
+
+groom_status groom_retarget_roots(const struct groom_retarget_source *source, const struct groom_retarget_target *target,
+                                  const struct groom_context *context, float (*roots)[3], struct groom_diag *diag)
+{
+    struct job job = {.source = source, .target = target};
+    groom_status st = check_target(source, target, diag);
+    (void)context;
+    for (uint32_t i = 0; st == GROOM_OK && i < source->strands->n_strands; i++) {
+        double p[3];
+        transfer_anchor(&job, source->strands->first[i], p);
+        for (int c = 0; c < 3; c++)
+            roots[i][c] = (float)p[c];
+    }
+    return st;
+}
