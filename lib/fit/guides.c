@@ -19,6 +19,7 @@
 #include "base/progress.h"
 #include "fit/guide_laplacian.h"
 #include "fit/guide_system.h"
+#include "fit/guides.h"
 #include "fit/loss_guides.h"
 #include "fit/mean_strands.h"
 #include "fit/paper_guides.h"
@@ -264,12 +265,12 @@ static groom_status choose_across(struct solution *solution, double along, doubl
     return st;
 }
 
-static groom_status solution_init(struct solution *solution, struct groom_fit *fit, const struct groom_context *context,
-                                  struct groom_diag *diag)
+static groom_status solution_init(struct solution *solution, struct groom_fit *fit, int known, double across,
+                                  const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     size_t size = (size_t)fit->n_guides * fit->m;
-    double cycles = fit->options.stages.guides.cycles, across = fit->options.stages.guides.across;
+    double cycles = fit->options.stages.guides.cycles;
     groom_status st;
     *solution = (struct solution){.fit = fit};
     solution->shape = memory_array(allocator, size, sizeof *solution->shape);
@@ -284,7 +285,9 @@ static groom_status solution_init(struct solution *solution, struct groom_fit *f
     load_shapes(solution);
     for (uint32_t g = 0; g < fit->n_guides; g++)
         root_direction(solution, g);
-    if ((st = mean_strands_init(&solution->mean, fit, context, diag)) != GROOM_OK ||
+    st = known ? mean_strands_init_known(&solution->mean, fit, context, diag)
+               : mean_strands_init(&solution->mean, fit, context, diag);
+    if (st != GROOM_OK ||
         (st = guide_laplacian((const float (*)[2])fit->groom->guide_uv, (const float (*)[3])solution->direction,
                               fit->n_guides, fit->options.stages.guides.sigma_d, &solution->laplacian, context,
                               diag)) != GROOM_OK)
@@ -357,7 +360,7 @@ static groom_status solve(struct groom_fit *fit, const struct groom_context *con
 {
     struct solution solution;
     double before, after;
-    groom_status st = solution_init(&solution, fit, context, diag);
+    groom_status st = solution_init(&solution, fit, 0, fit->options.stages.guides.across, context, diag);
     if (st != GROOM_OK)
         goto out;
     if ((st = loss_guides(fit, &before, context, diag)) != GROOM_OK ||
@@ -373,6 +376,20 @@ static groom_status solve(struct groom_fit *fit, const struct groom_context *con
     report_progress(&fit->report, "guides", "L_g", after, 1, context);
     fit->phase = ASSIGN;
 out:
+    solution_finish(&solution, context);
+    return st;
+}
+
+groom_status guides_refine(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    struct solution solution;
+    groom_status st = solution_init(&solution, fit, 1, fit->options.stages.randoms.across, context, diag);
+    if (st == GROOM_OK)
+        st = solve_rounds(&solution, context, diag);
+    if (st == GROOM_OK) {
+        fill_points(&solution);
+        exchange_guides(&solution);
+    }
     solution_finish(&solution, context);
     return st;
 }

@@ -22,6 +22,7 @@ struct mean_part { uint32_t guide; float shape, clumped; };
 struct mean_strands {
     uint32_t n, m, n_guides, n_parts;
     const float (*target)[3];  /* [n * m], borrowed */
+    float (*given)[3];         /* [n * m] what shapes must sum up to, or NULL: as follows from target and origin */
     struct mean_part *part;    /* [n][n_parts] */
     double (*origin)[3];       /* [n] root of the operator guide, in the target's frame */
     double *rest;              /* [m] */
@@ -34,6 +35,11 @@ struct mean_strands {
  * returns GROOM_OK, GROOM_ENOMEM; finish it in any case */
 GROOM_MUST_CHECK groom_status mean_strands_init(struct mean_strands *mean, const struct groom_fit *fit,
                                                 const struct groom_context *context, struct groom_diag *diag);
+/* The same of strands as they stand, random numbers and all, in place of their expectation: to first order
+ * in the shapes of the guides around those that the groom has. Scales, clumps and weights are in it; that
+ * curls and bends turn with the guides is not. Strands that are far from their targets weigh less. */
+GROOM_MUST_CHECK groom_status mean_strands_init_known(struct mean_strands *mean, const struct groom_fit *fit,
+                                                      const struct groom_context *context, struct groom_diag *diag);
 void mean_strands_finish(struct mean_strands *mean);
 
 /* Mean square distance of a vertex from its target (Eq. 7 over m), in the target's frame.

@@ -117,6 +117,8 @@ const struct option_row options_table[] = {
         "Weight of squared distances from the target over that of directions, both relative to what they were with the numbers as drawn."),
     ROW(randoms, hold, OPTION_REAL, 0.1, 0.1, 0.1, 0, 1e9,
         "Cost of moving an instancing weight by 1, squared, while a strand's numbers are refined with them."),
+    ROW(randoms, across, OPTION_REAL, 0.1, 0.1, 0.1, 1e-6, 1e6,
+        "Pull of each guide towards its neighbours on the scalp where guides are solved again, between rounds, for the numbers found."),
     ROW(randoms, iterations, OPTION_U32, 3000, 3000, 3000, 0, 1000000, "Gradient steps of the paper's method."),
     ROW(randoms, learning_rate, OPTION_REAL, 0.1, 0.1, 0.1, 0, 1e3, "Learning rate of the paper's method."),
     ROW(randoms, noise_first, OPTION_REAL, 1.5, 1.5, 1.5, 0, 1e3,

@@ -18,6 +18,7 @@
 #include "base/memory.h"
 #include "base/progress.h"
 #include "fit/gather.h"
+#include "fit/guides.h"
 #include "fit/loss_strands.h"
 #include "fit/paper_randoms.h"
 #include "fit/random_search.h"
@@ -37,9 +38,9 @@
 /* --- the row of passes ------------------------------------------------------------------------- */
 
 /* What is looked for: which operator guide each strand follows, the numbers of strands in one operator,
- * those of operator guides, or the last digits of all that a strand has. */
+ * those of operator guides, the last digits of all that a strand has, or the guides that go with them. */
 struct pass {
-    enum { FOLLOW, STRANDS, CURLS, POLISH } kind;
+    enum { FOLLOW, STRANDS, CURLS, POLISH, RESHAPE } kind;
     uint32_t round;
     uint32_t op, active; /* of STRANDS and CURLS: its index in the chain, and among those that are enabled */
 };
@@ -70,7 +71,8 @@ static uint32_t list_numbers(const struct groom *groom, uint32_t round, int per_
     return n;
 }
 
-/* In a round: what strands share, then whom they follow in it, then what each has of its own. */
+/* In a round: what strands share, then whom they follow in it, then what each has of its own; between rounds,
+ * guides for these numbers: those before were for any. */
 static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST_PASSES])
 {
     uint32_t n = 0, n_rounds = fit->options.stages.randoms.rounds;
@@ -80,14 +82,19 @@ static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST
         if (n_curls > 0 || clumps(fit->groom))
             passes[n++] = (struct pass){.kind = FOLLOW, .round = round};
         n += list_numbers(fit->groom, round, 0, passes + n);
-        if (n > begin)
+        if (n > begin) {
             passes[n++] = (struct pass){.kind = POLISH, .round = round};
+            if (round + 1 < n_rounds)
+                passes[n++] = (struct pass){.kind = RESHAPE, .round = round};
+        }
     }
     return n;
 }
 
 static uint32_t size_of(const struct groom_fit *fit, const struct pass *pass)
 {
+    if (pass->kind == RESHAPE)
+        return 1;
     return pass->kind == CURLS ? fit->groom->n_operator_guides : fit->n;
 }
 
@@ -235,6 +242,7 @@ static uint32_t step_size(const struct groom_fit *fit, const struct pass *pass)
     case STRANDS: values = grid_of(fit, pass); break;
     case CURLS: values = CURL_VALUES * fit->options.stages.randoms.strands; break;
     case POLISH: values = POLISH_VALUES; break;
+    case RESHAPE: return left;
     }
     wanted = STEP_WORK / values > 1 ? STEP_WORK / values : 1;
     return wanted < left ? wanted : left;
@@ -258,8 +266,17 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
         random_search_polish(search, fit->iteration, count, is_last(fit, pass) ? POLISH_STEPS : 1,
                              (float)fit->options.stages.randoms.hold, context);
         return GROOM_OK;
+    case RESHAPE: break;
     }
     return GROOM_EINTERNAL;
+}
+
+static groom_status reshape_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    groom_status st = guides_refine(fit, context, diag);
+    if (st == GROOM_OK)
+        fit->iteration++;
+    return st;
 }
 
 static groom_status search_step(struct groom_fit *fit, const struct pass *pass, const struct groom_context *context,
@@ -359,7 +376,8 @@ groom_status randoms_step(struct groom_fit *fit, int *ended, const struct groom_
             st = report_losses(fit, 0, context, diag);
         fit->phase += st == GROOM_OK;
     } else if (fit->iteration < size_of(fit, &passes[fit->phase - 1])) {
-        st = search_step(fit, &passes[fit->phase - 1], context, diag);
+        st = passes[fit->phase - 1].kind == RESHAPE ? reshape_step(fit, context, diag)
+                                                    : search_step(fit, &passes[fit->phase - 1], context, diag);
     } else {
         int last = fit->phase == n || passes[fit->phase].round != passes[fit->phase - 1].round;
         if (last)

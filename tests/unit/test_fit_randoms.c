@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "fit/gradient_strands.h"
+#include "fit/guides.h"
 #include "fit/loss_strands.h"
 #include "fit/state.h"
 #include "fit/strand_error.h"
@@ -150,6 +151,45 @@ START_TEST(numbers_of_bent_hair_are_found) { finds(GROOM_SAMPLE_BENT, 0.1, 0.1);
 START_TEST(numbers_of_spiky_hair_are_found) { finds(GROOM_SAMPLE_SPIKY, 0.1, 0.15); } END_TEST
 START_TEST(numbers_of_curls_are_found) { finds(GROOM_SAMPLE_CURLY, 0.4, 0.5); } END_TEST
 
+static double off_guides(const struct groom *a, const struct groom *b)
+{
+    double sum = 0;
+    for (size_t v = 0; v < (size_t)a->n_guides * a->n_vertices; v++)
+        for (int c = 0; c < 3; c++)
+            sum += pow((double)a->guides[v][c] - b->guides[v][c], 2);
+    return sqrt(sum / ((double)a->n_guides * a->n_vertices));
+}
+
+/* Guides of the truth, each turned and stretched a little, come back where numbers are the truth's. */
+static void come_back(groom_sample_style style, double share)
+{
+    struct groom_sample *sample = guides_sample(style, 600, M, 3, NULL);
+    struct groom_fit *fit = fit_of(sample, 2);
+    struct groom *groom = fit->groom;
+    for (uint32_t o = 0; o < groom->n_operators; o++)
+        for (uint32_t r = 0; r < groom_operator_random_arrays(groom->operators[o].type); r++)
+            memcpy(groom->operators[o].random[r], sample->truth->operators[o].random[r],
+                   (groom_operator_random_per_guide(groom->operators[o].type) ? groom->n_operator_guides : groom->n_strands) *
+                       sizeof(float));
+    for (uint32_t g = 0; g < groom->n_guides; g++)
+        for (uint32_t j = 1; j < groom->n_vertices; j++) {
+            float *x = groom->guides[(size_t)g * groom->n_vertices + j], *root = groom->guides[(size_t)g * groom->n_vertices];
+            for (int c = 0; c < 3; c++)
+                x[c] += (x[c] - root[c]) * 0.02f * (float)((int)(g % 5) - 2) + 0.004f * (float)j / M * (float)((int)(g % 3) - 1);
+        }
+    double before = off_guides(groom, sample->truth);
+    fit->options.stages.randoms.across = 1e-4;
+    for (int step = 0; step < 3; step++)
+        ck_ok(guides_refine(fit, NULL, NULL));
+    double after = off_guides(groom, sample->truth);
+    ck_assert_msg(after < share * before, "%g mm of %g mm", 1e3 * after, 1e3 * before);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+
+START_TEST(guides_of_straight_hair_follow_known_numbers) { come_back(GROOM_SAMPLE_STRAIGHT, 0.15); } END_TEST
+START_TEST(guides_of_wavy_hair_follow_known_numbers) { come_back(GROOM_SAMPLE_WAVY, 0.2); } END_TEST
+
 static void same_grooms(const struct groom *a, const struct groom *b)
 {
     size_t n = a->n_strands;
@@ -157,6 +197,7 @@ static void same_grooms(const struct groom *a, const struct groom *b)
         for (uint32_t r = 0; r < groom_operator_random_arrays(a->operators[o].type); r++)
             ck_assert_mem_eq(a->operators[o].random[r], b->operators[o].random[r],
                              (groom_operator_random_per_guide(a->operators[o].type) ? a->n_operator_guides : n) * sizeof(float));
+    ck_assert_mem_eq(a->guides, b->guides, (size_t)a->n_guides * a->n_vertices * sizeof *a->guides);
     ck_assert_mem_eq(a->instancing_weight, b->instancing_weight, n * a->n_instancing * sizeof(float));
     ck_assert_mem_eq(a->operator_guide_of, b->operator_guide_of, n * sizeof(uint32_t));
 }
@@ -192,7 +233,7 @@ static groom_status append(void *user, const void *from, size_t n)
 START_TEST(the_stage_can_be_interrupted_anywhere)
 {
     struct groom_sample *sample = guides_sample(GROOM_SAMPLE_WAVY, 220, M, 3, NULL);
-    struct groom_fit *whole = fit_of(sample, 1), *other = fit_of(sample, 1);
+    struct groom_fit *whole = fit_of(sample, 2), *other = fit_of(sample, 2);
     int steps = 0;
     finish(whole, NULL);
     for (; !groom_fit_done(other); steps++) {
@@ -201,7 +242,7 @@ START_TEST(the_stage_can_be_interrupted_anywhere)
         ck_ok(groom_fit_save(other, (struct groom_sink){append, &bytes}, NULL));
         struct groom_memory_source memory;
         struct groom_source source = groom_source_from_memory(&memory, bytes.at, bytes.n);
-        struct groom_fit *next = fit_of(sample, 1);
+        struct groom_fit *next = fit_of(sample, 2);
         ck_ok(groom_fit_load(next, &source, NULL, NULL));
         groom_fit_destroy(other);
         other = next;
@@ -365,6 +406,7 @@ END_TEST
 TEST_SUITE("fit_randoms", the_error_is_none_on_the_same_curve_however_its_vertices_stand,
            the_error_has_the_same_bits_in_all_variants, the_losses_are_those_of_their_equation,
            numbers_of_bent_hair_are_found, numbers_of_spiky_hair_are_found, numbers_of_curls_are_found,
+           guides_of_straight_hair_follow_known_numbers, guides_of_wavy_hair_follow_known_numbers,
            the_stage_has_the_same_bits_for_any_threads, the_stage_can_be_interrupted_anywhere,
            a_step_without_memory_changes_nothing, no_rounds_leave_the_numbers_as_they_were_drawn,
            the_papers_gradient_is_that_of_its_loss, the_papers_steps_go_down,
