@@ -6,10 +6,10 @@
  *   e'_j = R(a, angle q_j) e_j,  x~_j = x_1 + sum_{i<j} e'_i */
 #include "model/arc.h"
 #include "model/kernel.h"
+#include "model/vec.h"
 
 enum { ANGLE, START };
 
-#define START_STEEPNESS 10.0f
 #define TURNS_IN_RADIAN 0.159154943f
 #define PI 3.14159265f
 
@@ -36,7 +36,7 @@ LANES_INLINE void bend_measure(const struct kernel_inputs *in, const lanes *rest
     for (uint32_t j = 0; j + 1 < m; j++)
         FOR_LANES(l)
         {
-            float z = lane_sigmoid(START_STEEPNESS * (at[j + 1][l] * bend->inverse[l] - start));
+            float z = lane_begun(at[j + 1][l] * bend->inverse[l], start);
             sum[l] += ell[j][l] * z;
             begun[j][l] = z;
             bent[j][l] = sum[l];
@@ -50,27 +50,40 @@ LANES_INLINE void bend_measure(const struct kernel_inputs *in, const lanes *rest
         FOR_LANES(l) bend->axis[c][l] = bend->cosine[l] * in->axis[c][l] + bend->sine[l] * in->axis[3 + c][l];
 }
 
+/* How far each segment has turned: sum of l zeta' up to and with it, and 1 / that of all. */
+LANES_INLINE vec bend_sums(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict scratch)
+{
+    lanes *at = scratch, *bent = scratch + in->m;
+    vec inverse = vec_arc(in->m, x, at), sum = {0}, before = {0};
+    for (uint32_t j = 0; j + 1 < in->m; j++) {
+        vec s = vec_load(at[j + 1]);
+        sum += (s - before) * vec_begun(s * inverse, in->parameter[START]);
+        vec_store(bent[j], sum);
+        before = s;
+    }
+    return vec_inverse(sum);
+}
+
 LANES_INLINE void bend_forward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,
                                lanes *restrict scratch)
 {
-    struct bend bend;
-    bend_measure(in, x, scratch, &bend);
-    float turns = in->parameter[ANGLE] * TURNS_IN_RADIAN;
-    for (int c = 0; c < 3; c++)
-        FOR_LANES(l) y[c][l] = x[c][l];
-    for (uint32_t j = 0; j + 1 < in->m; j++) {
-        const lanes *p = x + 3 * j;
-        lanes *q = y + 3 * j;
-        FOR_LANES(l)
-        {
-            float ax = bend.axis[0][l], ay = bend.axis[1][l], az = bend.axis[2][l];
-            float ex = p[3][l] - p[0][l], ey = p[4][l] - p[1][l], ez = p[5][l] - p[2][l], s, c;
-            lane_sincos_turns(turns * (bend.bent[j][l] * bend.inverse_bent[l]), &s, &c);
-            float along = (1.0f - c) * (ax * ex + ay * ey + az * ez);
-            q[3][l] = q[0][l] + (c * ex + s * (ay * ez - az * ey) + along * ax);
-            q[4][l] = q[1][l] + (c * ey + s * (az * ex - ax * ez) + along * ay);
-            q[5][l] = q[2][l] + (c * ez + s * (ax * ey - ay * ex) + along * az);
-        }
+    const lanes *bent = scratch + in->m;
+    vec rate = in->parameter[ANGLE] * TURNS_IN_RADIAN * bend_sums(in, x, scratch), s, c, a[3];
+    vec_sincos_turns(0.5f * vec_load(in->random[0]), &s, &c);
+    for (int k = 0; k < 3; k++)
+        a[k] = c * vec_load(in->axis[k]) + s * vec_load(in->axis[3 + k]);
+    vec_copy_root(x, y);
+    vec px = vec_load(x[0]), py = vec_load(x[1]), pz = vec_load(x[2]), rx = px, ry = py, rz = pz;
+    for (uint32_t j = 1; j < in->m; j++) {
+        vec qx = vec_load(x[3 * j]), qy = vec_load(x[3 * j + 1]), qz = vec_load(x[3 * j + 2]);
+        vec ex = qx - px, ey = qy - py, ez = qz - pz;
+        vec_sincos_turns(rate * vec_load(bent[j - 1]), &s, &c);
+        vec along = (1.0f - c) * (a[0] * ex + a[1] * ey + a[2] * ez);
+        rx += c * ex + s * (a[1] * ez - a[2] * ey) + along * a[0];
+        ry += c * ey + s * (a[2] * ex - a[0] * ez) + along * a[1];
+        rz += c * ez + s * (a[0] * ey - a[1] * ex) + along * a[2];
+        vec_store(y[3 * j], rx), vec_store(y[3 * j + 1], ry), vec_store(y[3 * j + 2], rz);
+        px = qx, py = qy, pz = qz;
     }
 }
 

@@ -1,31 +1,6 @@
-/* Vectors of four floats, which every processor we build for has, written with the compiler's own
- * vector type; the arithmetic is element by element, so that the bits do not depend on it. */
 #include "model/block.h"
 
-#include <string.h>
-
-#define QUAD 4
-
-typedef float quad __attribute__((vector_size(16)));
-
-LANES_INLINE quad load(const float *from)
-{
-    quad q;
-    memcpy(&q, from, sizeof q);
-    return q;
-}
-
-LANES_INLINE void store(float *to, quad q) { memcpy(to, &q, sizeof q); }
-
-/* Four consecutive floats of a row of points repeat a 3-vector from coordinate 0, 1 or 2. */
-struct repeated {
-    quad from[3];
-};
-
-LANES_INLINE struct repeated repeat(const float v[3])
-{
-    return (struct repeated){{{v[0], v[1], v[2], v[0]}, {v[1], v[2], v[0], v[1]}, {v[2], v[0], v[1], v[2]}}};
-}
+#include "model/quad.h"
 
 struct block block_of(const uint32_t *strand, uint32_t n)
 {
@@ -35,45 +10,70 @@ struct block block_of(const uint32_t *strand, uint32_t n)
     return block;
 }
 
-LANES_INLINE void blend_quad(const float *restrict guide, quad root, quad weight, float *restrict row, int first)
+#define MOST_BLENDED 4 /* guides a strand: with more, blends are added up in memory */
+
+/* What four lanes blend: their guides and weights. */
+struct blend {
+    const float *guide[QUAD][MOST_BLENDED];
+    quad weight[QUAD][MOST_BLENDED];
+};
+
+static void blend_of(const struct groom *groom, const float *relative, const uint32_t *strand, uint32_t first, uint32_t k,
+                     struct blend *blend)
 {
-    quad term = weight * (load(guide) - root);
-    store(row, first ? term : load(row) + term);
+    for (uint32_t l = 0; l < QUAD; l++)
+        for (uint32_t a = 0; a < k; a++) {
+            size_t at = (size_t)strand[l] * groom->n_instancing + first + a;
+            blend->guide[l][a] = relative + (size_t)3 * groom->n_vertices * groom->instancing_guide[at];
+            blend->weight[l][a] = quad_of(groom->instancing_weight[at]);
+        }
 }
 
-/* row = [row +] weight (guide - its root), a cycle of four points at a time */
-LANES_INLINE void blend(const float *restrict guide, float weight, uint32_t n, float *restrict row, int first)
+/* x = [x +] sum over k guides of weight guide, four points of four lanes at a time. */
+LANES_INLINE void blend_quads(const struct blend *blend, uint32_t k, uint32_t n, int add, lanes *restrict x)
 {
-    struct repeated root = repeat(guide);
-    quad w = {weight, weight, weight, weight};
     uint32_t i = 0;
-    for (; i + 3 * QUAD <= n; i += 3 * QUAD)
-        for (uint32_t c = 0; c < 3; c++)
-            blend_quad(guide + i + c * QUAD, root.from[c], w, row + i + c * QUAD, first);
-    for (; i < n; i++) {
-        float term = weight * (guide[i] - guide[i % 3]);
-        row[i] = first ? term : row[i] + term;
+    for (; i + QUAD <= n; i += QUAD) {
+        quad r[QUAD];
+        for (uint32_t l = 0; l < QUAD; l++) {
+            r[l] = blend->weight[l][0] * quad_load(blend->guide[l][0] + i);
+            for (uint32_t a = 1; a < k; a++)
+                r[l] += blend->weight[l][a] * quad_load(blend->guide[l][a] + i);
+        }
+        quad_transpose(r);
+        for (uint32_t t = 0; t < QUAD; t++)
+            quad_store(x[i + t], add ? quad_load(x[i + t]) + r[t] : r[t]);
+    }
+    for (; i < n; i++)
+        for (uint32_t l = 0; l < QUAD; l++) {
+            float sum = blend->weight[l][0][0] * blend->guide[l][0][i];
+            for (uint32_t a = 1; a < k; a++)
+                sum += blend->weight[l][a][0] * blend->guide[l][a][i];
+            x[i][l] = add ? x[i][l] + sum : sum;
+        }
+}
+
+/* Bodies for each number of guides, which stay in registers. */
+static void blend_some(const struct blend *blend, uint32_t k, uint32_t n, int add, lanes *x)
+{
+    switch (k) {
+    case 1: blend_quads(blend, 1, n, add, x); break;
+    case 2: blend_quads(blend, 2, n, add, x); break;
+    case 3: blend_quads(blend, 3, n, add, x); break;
+    default: blend_quads(blend, MOST_BLENDED, n, add, x);
     }
 }
 
-void block_instance(const struct groom *groom, uint32_t strand, float *row)
+void block_instance(const struct groom *groom, const float *relative, const struct block *block, lanes *x)
 {
-    uint32_t n = 3 * groom->n_vertices;
-    size_t at = (size_t)strand * groom->n_instancing;
-    for (uint32_t k = 0; k < groom->n_instancing; k++) {
-        const float *guide = groom->guides[(size_t)groom->instancing_guide[at + k] * groom->n_vertices];
-        blend(guide, groom->instancing_weight[at + k], n, row, k == 0);
-    }
-}
-
-LANES_INLINE void transpose(quad r[QUAD])
-{
-    quad a = __builtin_shufflevector(r[0], r[1], 0, 4, 1, 5), b = __builtin_shufflevector(r[0], r[1], 2, 6, 3, 7);
-    quad c = __builtin_shufflevector(r[2], r[3], 0, 4, 1, 5), d = __builtin_shufflevector(r[2], r[3], 2, 6, 3, 7);
-    r[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
-    r[1] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
-    r[2] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
-    r[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+    uint32_t k = groom->n_instancing, n = 3 * groom->n_vertices;
+    struct blend blend;
+    for (uint32_t lane = 0; lane < LANES; lane += QUAD)
+        for (uint32_t a = 0; a < k; a += MOST_BLENDED) {
+            uint32_t some = k - a < MOST_BLENDED ? k - a : MOST_BLENDED;
+            blend_of(groom, relative, block->strand + lane, a, some, &blend);
+            blend_some(&blend, some, n, a > 0, (lanes *)(x[0] + lane)); /* the lines keep their width */
+        }
 }
 
 /* Coordinate c = 0, 1, 2, 0, 1, 2 of the vectors of four lanes, or zeroes. */
@@ -93,10 +93,10 @@ void block_from_rows(const float *const row[LANES], const float *const subtract[
         gather_vectors(subtract, lane, coordinate);
         for (; i + QUAD <= n; i += QUAD, c = c == 2 ? 0 : c + 1) {
             for (uint32_t l = 0; l < QUAD; l++)
-                r[l] = load(row[lane + l] + i);
-            transpose(r);
+                r[l] = quad_load(row[lane + l] + i);
+            quad_transpose(r);
             for (uint32_t t = 0; t < QUAD; t++)
-                store(&x[i + t][lane], r[t] - coordinate[c + t]);
+                quad_store(&x[i + t][lane], r[t] - coordinate[c + t]);
         }
         for (; i < n; i++)
             for (uint32_t l = 0; l < QUAD; l++)
@@ -113,10 +113,10 @@ void block_to_rows(const lanes *restrict x, const float *const add[LANES], uint3
         gather_vectors(add, lane, coordinate);
         for (; i + QUAD <= n; i += QUAD, c = c == 2 ? 0 : c + 1) {
             for (uint32_t t = 0; t < QUAD; t++)
-                r[t] = load(&x[i + t][lane]) + coordinate[c + t];
-            transpose(r);
+                r[t] = quad_load(&x[i + t][lane]) + coordinate[c + t];
+            quad_transpose(r);
             for (uint32_t l = 0; l < n_here; l++)
-                store(row[lane + l] + i, r[l]);
+                quad_store(row[lane + l] + i, r[l]);
         }
         for (; i < n; i++)
             for (uint32_t l = 0; l < n_here; l++)

@@ -15,8 +15,9 @@ struct block {
 struct block block_of(const uint32_t *strand, uint32_t n);
 
 /* Eq. 3 relative to the root: sum over k of weight (guide_j - guide_1).
- * row      [3m] */
-void block_instance(const struct groom *groom, uint32_t strand, float *row);
+ * relative  [n_g][3m] guides relative to their roots; those of the block's strands are looked at
+ * x         [3m] */
+void block_instance(const struct groom *groom, const float *relative, const struct block *block, lanes *x);
 
 /* Rows [n] side by side.
  * subtract  one 3-vector of each lane, taken from each of its points, or NULL */

@@ -5,13 +5,13 @@
  * The frame (n, b) is the operator guide's: model/frames.h. */
 #include "model/arc.h"
 #include "model/kernel.h"
+#include "model/vec.h"
 
 enum { RADIUS, FREQUENCY, RANDOM_FREQUENCY, START };
 
 #define RADIUS_AT_ROOT 0.43f
 #define RADIUS_GROWTH 0.79f
 #define RANDOM_TURNS 3.9f
-#define START_STEEPNESS 10.0f
 #define TWO_PI 6.28318531f
 
 LANES_INLINE void turning(const struct kernel_inputs *in, float *restrict rate, float *restrict shift)
@@ -27,26 +27,22 @@ LANES_INLINE void turning(const struct kernel_inputs *in, float *restrict rate, 
 LANES_INLINE void curl_forward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,
                                lanes *restrict scratch)
 {
-    uint32_t m = in->m;
-    lanes *ell = scratch, *at = scratch + m, inverse, rate, shift;
+    lanes *at = scratch, rates, shifts;
     float radius = in->parameter[RADIUS], start = in->parameter[START];
-    arc_measure(m, x, ell, at, inverse);
-    turning(in, rate, shift);
-    for (int c = 0; c < 3; c++)
-        FOR_LANES(l) y[c][l] = x[c][l];
-    for (uint32_t j = 1; j < m; j++) {
+    vec inverse = vec_arc(in->m, x, at);
+    turning(in, rates, shifts);
+    vec rate = vec_load(rates), shift = vec_load(shifts), sine, cosine;
+    vec_copy_root(x, y);
+    for (uint32_t j = 1; j < in->m; j++) {
         const lanes *p = x + 3 * j, *frame = in->frame + FRAME_WIDTH * j;
         lanes *q = y + 3 * j;
-        FOR_LANES(l)
-        {
-            float v = at[j][l] * inverse[l], sine, cosine;
-            float size = radius * (RADIUS_AT_ROOT + RADIUS_GROWTH * v) * lane_sigmoid(START_STEEPNESS * (v - start));
-            lane_sincos_turns(at_most(at[j][l] * rate[l] + shift[l], MANY_TURNS), &sine, &cosine);
-            float along_n = size * sine, along_b = size * cosine;
-            q[0][l] = p[0][l] + (along_n * frame[0][l] + along_b * frame[2][l]);
-            q[1][l] = p[1][l] + (along_n * frame[1][l] + along_b * frame[3][l]);
-            q[2][l] = p[2][l] + along_b * frame[4][l];
-        }
+        vec s = vec_load(at[j]), v = s * inverse;
+        vec size = radius * (RADIUS_AT_ROOT + RADIUS_GROWTH * v) * vec_begun(v, start);
+        vec_sincos_turns(vec_at_most(s * rate + shift, MANY_TURNS), &sine, &cosine);
+        vec along_n = size * sine, along_b = size * cosine;
+        vec_store(q[0], vec_load(p[0]) + (along_n * vec_load(frame[0]) + along_b * vec_load(frame[2])));
+        vec_store(q[1], vec_load(p[1]) + (along_n * vec_load(frame[1]) + along_b * vec_load(frame[3])));
+        vec_store(q[2], vec_load(p[2]) + along_b * vec_load(frame[4]));
     }
 }
 
@@ -66,7 +62,7 @@ LANES_INLINE void curl_backward(const struct kernel_inputs *in, const lanes *res
         FOR_LANES(l)
         {
             float v = at[j][l] * inverse[l], sine, cosine;
-            float growth = RADIUS_AT_ROOT + RADIUS_GROWTH * v, begun = lane_sigmoid(START_STEEPNESS * (v - start));
+            float growth = RADIUS_AT_ROOT + RADIUS_GROWTH * v, begun = lane_begun(v, start);
             float size = radius * growth * begun;
             lane_sincos_turns(at_most(at[j][l] * rate[l] + shift[l], MANY_TURNS), &sine, &cosine);
             float dx = dp[0][l], dy = dp[1][l], dz = dp[2][l];

@@ -12,9 +12,11 @@
 
 struct kernel_inputs {
     uint32_t m;         /* vertices */
-    const lanes *guide; /* [3m] operator guide relative to the strand's root; where the chain clumps */
+    const lanes *root;  /* [3] of the strand */
+    const lanes *guide; /* [3m] operator guide, in space; where the chain clumps */
     const lanes *frame; /* [FRAME_WIDTH * m]; where the chain curls */
     const lanes *axis;  /* [AXIS_WIDTH]; where the chain bends */
+    const float *noise; /* [NOISE_CELLS + 1] gradients, where the chain frizzes and NOISE_LOOKED_UP */
     float parameter[GROOM_OPERATOR_MAX_PARAMETERS];
     lanes random[GROOM_OPERATOR_MAX_RANDOM];
 };

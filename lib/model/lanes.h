@@ -1,7 +1,7 @@
 /* Kernels work on blocks of LANES strands: one lane a strand, structure of arrays.
  *
- * A kernel is an always-inline body in plain C whose innermost loop runs over the lanes, so that the
- * compiler turns it into vector instructions; KERNEL_VARIANTS wraps the body once for each
+ * A kernel is an always-inline body in plain C: forward in vectors of the compiler's own (model/vec.h),
+ * backward in innermost loops over the lanes that it turns into vectors; KERNEL_VARIANTS wraps the body once for each
  * instruction set. No lane looks at another, nothing is contracted into fused multiply-adds, and the
  * functions below are polynomials of our own: a strand's numbers are the same bits whatever the
  * instruction set, its lane and its neighbours. */
@@ -11,7 +11,11 @@
 #include <math.h>
 #include <stdint.h>
 
+#ifdef __wasm__
+#define LANES 4 /* one vector: no loop is left within a line of a block */
+#else
 #define LANES 8
+#endif
 
 /* One number of each strand of a block. Arrays of a block are [..][LANES]; a block's points are
  * lanes x[3 * m], coordinate c of vertex j in x[3 * j + c], relative to the strand's root. */
@@ -46,6 +50,22 @@ LANES_INLINE float float_of(int32_t i) { return ((union lane_bits){.i = i}).f; }
 LANES_INLINE float at_most(float x, float limit) { return x < limit ? x : limit; }
 LANES_INLINE float at_least(float x, float limit) { return x > limit ? x : limit; }
 
+/* The largest whole number up to t, |t| below 2^22, and that number as an integer. One instruction finds it
+ * where there is one for it; the bits are the same. */
+LANES_INLINE float lane_floor(float t, int32_t *whole)
+{
+#if defined(__wasm_simd128__) || defined(__aarch64__)
+    float below = floorf(t);
+    *whole = bits_of(below + ROUNDER) - bits_of(ROUNDER);
+    return below;
+#else
+    float rounded = t + ROUNDER, near = rounded - ROUNDER;
+    int32_t back = t < near ? -1 : 0;
+    *whole = bits_of(rounded) - bits_of(ROUNDER) + back;
+    return near - float_of(back & bits_of(1.0f));
+#endif
+}
+
 /* 1 / x, or 0 where x is no length. */
 LANES_INLINE float lane_inverse(float x)
 {
@@ -54,39 +74,46 @@ LANES_INLINE float lane_inverse(float x)
     return x > NO_LENGTH ? inverse : 0.0f;
 }
 
-/* e^x for x up to 88, below 2 ulps off (tested); e^-87 for anything less. */
-LANES_INLINE float lane_exp(float x)
+#define LOG2_E 1.44269504f
+
+/* Polynomials are macros, for floats and for vectors of them (model/vec.h) alike; z is r r. In Estrin's
+ * order, whose halves need not wait for each other. */
+#define EXP2_POLYNOMIAL(r, z)                                                                                        \
+    ((1.0f + 0.693147004f * (r)) +                                                                                   \
+     (z) * ((0.240222424f + 0.0555073358f * (r)) + (z) * (0.00967151299f + 0.0013264725f * (r))))
+
+/* 2^x for x up to 127, below 3 ulps off (tested); 2^-126 for anything less. */
+LANES_INLINE float lane_exp2(float x)
 {
-    x = at_least(x, -87.0f);
-    float rounded = x * 1.44269504f + ROUNDER;
-    float n = rounded - ROUNDER;
-    float r = (x - n * 0.693359375f) - n * -2.12194440e-4f;
-    float p = 0.00139262038f;
-    p = p * r + 0.00836319476f;
-    p = p * r + 0.0416665561f;
-    p = p * r + 0.166665763f;
-    p = p * r + 0.5f;
-    p = (p * (r * r) + r) + 1.0f;
-    return p * float_of((bits_of(rounded) - bits_of(ROUNDER) + 127) << 23);
+    x = at_least(x, -126.0f);
+    float rounded = x + ROUNDER, r = x - (rounded - ROUNDER), z = r * r, p = EXP2_POLYNOMIAL(r, z);
+    return float_of((int32_t)((uint32_t)bits_of(p) + ((uint32_t)bits_of(rounded) << 23))); /* the rounder's own bits leave */
 }
 
-LANES_INLINE float lane_sigmoid(float x) { return 1.0f / (1.0f + lane_exp(-x)); }
+/* zeta': how far an operator that sets in at `start` has begun at v, both fractions of arc length:
+ * 1 / (1 + e^(-10 (v - start))), the exponent to base 2. */
+#define START_STEEPNESS 10.0f
+LANES_INLINE float lane_begun(float v, float start)
+{
+    return 1.0f / (1.0f + lane_exp2((START_STEEPNESS * LOG2_E) * (start - v)));
+}
 
 /* Turns, and waves of the noise, beyond which a float no longer tells where in the turn it is. */
 #define MANY_TURNS 0x1p20f
 
-/* sin and cos of 2 pi turns for |turns| up to MANY_TURNS, 2e-7 off at most (tested). */
+/* sin and cos of 2 pi turns for |turns| up to MANY_TURNS, 2e-7 off at most (tested): reduced to a
+ * quarter of a turn on either side of a whole or half one. */
+#define SINE_POLYNOMIAL(r, z)                                                                                        \
+    (((r) * (z)) * ((2.55003142f * (z) - 5.16770696f) + ((z) * (z)) * (0.0772201261f * (z) - 0.59804517f)) + (r) * 3.14159251f)
+#define COSINE_POLYNOMIAL(z)                                                                                         \
+    ((1.0f - 4.93479538f * (z)) + ((z) * (z)) * ((4.05845118f - 1.33209383f * (z)) + 0.220080629f * ((z) * (z))))
 LANES_INLINE void lane_sincos_turns(float turns, float *sine, float *cosine)
 {
-    float rounded = turns * 4.0f + ROUNDER;
-    float r = turns - (rounded - ROUNDER) * 0.25f, z = r * r;
-    int32_t quadrant = bits_of(rounded);
-    float s = r * (((-75.4016113f * z + 81.5925446f) * z - 41.3416634f) * z + 6.28318548f);
-    float c = (((59.4241066f * z - 85.448822f) * z + 64.9393692f) * z - 19.7392082f) * z + 1.0f;
-    int32_t swap = -(quadrant & 1), s_bits = bits_of(s), c_bits = bits_of(c);
-    int32_t s_sign = (int32_t)((uint32_t)(quadrant & 2) << 30), c_sign = (int32_t)((uint32_t)((quadrant + 1) & 2) << 30);
-    *sine = float_of(((c_bits & swap) | (s_bits & ~swap)) ^ s_sign);
-    *cosine = float_of(((s_bits & swap) | (c_bits & ~swap)) ^ c_sign);
+    float halves = turns * 2.0f, rounded = halves + ROUNDER;
+    float r = halves - (rounded - ROUNDER), z = r * r;
+    int32_t sign = (int32_t)((uint32_t)bits_of(rounded) << 31);
+    *sine = float_of(bits_of(SINE_POLYNOMIAL(r, z)) ^ sign);
+    *cosine = float_of(bits_of(COSINE_POLYNOMIAL(z)) ^ sign);
 }
 
 #endif

@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "model/frames.h"
 #include "model/model.h"
+#include "model/noise.h"
 
 #define GUIDES_A_PIECE 32
 
@@ -21,6 +22,7 @@ static void list_active(struct plan *plan)
         plan->bends |= groom->operators[i].type == GROOM_OPERATOR_BEND;
         plan->curls |= groom->operators[i].type == GROOM_OPERATOR_CURL;
         plan->clumps |= groom->operators[i].type == GROOM_OPERATOR_CLUMP;
+        plan->frizzes |= groom->operators[i].type == GROOM_OPERATOR_FRIZZ;
     }
 }
 
@@ -68,6 +70,38 @@ static groom_status compute_frames(struct plan *plan, const uint32_t *strand, ui
     return GROOM_OK;
 }
 
+/* Guides relative to their roots: of these strands alone, too. */
+static groom_status make_relative(struct plan *plan, const uint32_t *strand, uint32_t first, uint32_t count)
+{
+    const struct groom *groom = plan->groom;
+    uint32_t n = 3 * groom->n_vertices, k = groom->n_instancing;
+    uint8_t *made = memory_array_zero(plan->allocator, groom->n_guides, sizeof *made);
+    plan->relative = memory_array(plan->allocator, (size_t)groom->n_guides * n, sizeof *plan->relative);
+    for (uint32_t i = 0; made && plan->relative && i < count; i++)
+        for (uint32_t a = 0; a < k; a++) {
+            uint32_t g = groom->instancing_guide[(size_t)(strand ? strand[i] : first + i) * k + a];
+            if (made[g])
+                continue;
+            made[g] = 1;
+            const float *from = groom->guides[(size_t)g * groom->n_vertices];
+            float *to = plan->relative + (size_t)g * n;
+            for (uint32_t j = 0; j < n; j += 3)
+                for (uint32_t c = 0; c < 3; c++)
+                    to[j + c] = from[j + c] - from[c];
+        }
+    memory_release(plan->allocator, made, groom->n_guides, sizeof *made);
+    return made && plan->relative ? GROOM_OK : GROOM_ENOMEM;
+}
+
+static groom_status fill_noise(struct plan *plan)
+{
+    plan->noise = memory_array(plan->allocator, NOISE_CELLS + 1, sizeof *plan->noise);
+    if (!plan->noise)
+        return GROOM_ENOMEM;
+    noise_fill(plan->noise);
+    return GROOM_OK;
+}
+
 groom_status plan_init(struct plan *plan, const struct groom *groom, const uint32_t *strand, uint32_t first,
                        uint32_t count, enum kernel_variant variant, const struct groom_context *context)
 {
@@ -77,8 +111,12 @@ groom_status plan_init(struct plan *plan, const struct groom *groom, const uint3
     if (!plan->active)
         return GROOM_ENOMEM;
     list_active(plan);
-    if (plan->bends || plan->curls)
+    if (!groom->base)
+        status = make_relative(plan, strand, first, count);
+    if (status == GROOM_OK && (plan->bends || plan->curls))
         status = compute_frames(plan, strand, first, count, context);
+    if (status == GROOM_OK && plan->frizzes && NOISE_LOOKED_UP)
+        status = fill_noise(plan);
     if (status != GROOM_OK)
         plan_finish(plan);
     return status;
@@ -90,8 +128,11 @@ void plan_finish(struct plan *plan)
         return;
     size_t n = plan->groom->n_operator_guides, width = (size_t)FRAME_WIDTH * plan->groom->n_vertices;
     memory_release(plan->allocator, plan->active, plan->groom->n_operators, sizeof *plan->active);
+    memory_release(plan->allocator, plan->relative, (size_t)plan->groom->n_guides * 3 * plan->groom->n_vertices,
+                   sizeof *plan->relative);
     memory_release(plan->allocator, plan->frame, n * width, sizeof(float));
     memory_release(plan->allocator, plan->axis, n * AXIS_WIDTH, sizeof(float));
+    memory_release(plan->allocator, plan->noise, NOISE_CELLS + 1, sizeof *plan->noise);
     *plan = (struct plan){0};
 }
 
@@ -143,37 +184,25 @@ static void load_table(const struct plan *plan, const struct block *block, const
 static void load_guides(const struct plan *plan, const struct block *block, lanes *x)
 {
     const struct groom *groom = plan->groom;
-    const float *row[LANES], *root[LANES];
+    const float *row[LANES];
     for (uint32_t l = 0; l < LANES; l++) {
         uint32_t guide = groom->operator_guide[groom->operator_guide_of[block->strand[l]]];
         row[l] = groom->guides[(size_t)guide * groom->n_vertices];
     }
-    plan_roots(plan, block, root);
-    block_from_rows(row, root, 3 * groom->n_vertices, x);
+    block_from_rows(row, NULL, 3 * groom->n_vertices, x);
 }
 
-/* A strand relative to its root, as it comes into the chain. */
-static void load_strand(const struct groom *groom, uint32_t strand, uint32_t m, float *row)
+/* What the kernels see of the operator guides, where it is not that of the last block. */
+static void load_operator_guides(const struct plan *plan, const struct block *block, struct workspace *w)
 {
-    if (!groom->base) {
-        block_instance(groom, strand, row);
+    uint32_t wanted[LANES];
+    if (!plan->clumps && !plan->curls && !plan->bends)
         return;
-    }
-    const float *root = model_root(groom, strand), *from = root;
-    for (uint32_t i = 0; i < 3 * m; i++)
-        row[i] = from[i] - root[i % 3];
-}
-
-void plan_load(const struct plan *plan, const struct block *block, struct workspace *w)
-{
-    const float *row[LANES];
-    for (uint32_t l = 0; l < LANES; l++) {
-        uint32_t own = l < block->n ? l : block->n - 1;
-        row[l] = w->rows + (size_t)own * 3 * w->m;
-        if (own == l)
-            load_strand(plan->groom, block->strand[l], w->m, w->rows + (size_t)l * 3 * w->m);
-    }
-    block_from_rows(row, NULL, 3 * w->m, w->state);
+    for (uint32_t l = 0; l < LANES; l++)
+        wanted[l] = plan->groom->operator_guide_of[block->strand[l]] + 1;
+    if (memcmp(wanted, w->loaded, sizeof wanted) == 0)
+        return;
+    memcpy(w->loaded, wanted, sizeof wanted);
     if (plan->clumps)
         load_guides(plan, block, w->guide);
     if (plan->curls)
@@ -182,11 +211,38 @@ void plan_load(const struct plan *plan, const struct block *block, struct worksp
         load_table(plan, block, plan->axis, AXIS_WIDTH, w->axis);
 }
 
+/* A base's strands, relative to where they begin. */
+static void load_base(const struct plan *plan, const struct block *block, struct workspace *w)
+{
+    uint32_t n = 3 * w->m;
+    const float *row[LANES];
+    for (uint32_t l = 0; l < LANES; l++) {
+        const float *from = model_root(plan->groom, block->strand[l]);
+        float *to = w->rows + (size_t)l * n;
+        row[l] = to;
+        for (uint32_t i = 0; i < n; i++)
+            to[i] = from[i] - from[i % 3];
+    }
+    block_from_rows(row, NULL, n, w->state);
+}
+
+void plan_load(const struct plan *plan, const struct block *block, struct workspace *w)
+{
+    if (plan->groom->base)
+        load_base(plan, block, w);
+    else
+        block_instance(plan->groom, plan->relative, block, w->state);
+    for (uint32_t l = 0; l < LANES; l++)
+        for (int c = 0; c < 3; c++)
+            w->root[c][l] = model_root(plan->groom, block->strand[l])[c];
+    load_operator_guides(plan, block, w);
+}
+
 struct kernel_inputs plan_inputs(const struct plan *plan, const struct block *block, const struct workspace *w,
                                  uint32_t a)
 {
     const struct groom_operator *op = &plan->groom->operators[plan->active[a]];
-    struct kernel_inputs in = {.m = w->m, .guide = w->guide, .frame = w->frame, .axis = w->axis};
+    struct kernel_inputs in = {.m = w->m, .root = (const lanes *)w->root, .guide = w->guide, .frame = w->frame, .axis = w->axis, .noise = plan->noise};
     memcpy(in.parameter, op->parameter, sizeof in.parameter);
     for (uint32_t r = 0; r < groom_operator_random_arrays(op->type); r++)
         for (uint32_t l = 0; l < LANES; l++) {

@@ -12,9 +12,11 @@ struct plan {
     enum kernel_variant variant;
     uint32_t n_active;      /* enabled operators */
     uint32_t *active;       /* [n_active] their indices, in the order of the chain */
-    int bends, curls, clumps;
+    int bends, curls, clumps, frizzes;
+    float *relative;        /* [n_g][3m] guides relative to their roots, where the groom has no base */
     float *frame;           /* [n_gop][FRAME_WIDTH * m] where it curls */
     float *axis;            /* [n_gop][AXIS_WIDTH] where it bends */
+    float *noise;           /* [NOISE_CELLS + 1] where it frizzes and NOISE_LOOKED_UP */
     const struct groom_allocator *allocator;
 };
 
@@ -28,11 +30,14 @@ void plan_finish(struct plan *plan);
 /* One thread's memory for one block. */
 struct workspace {
     uint32_t m, n_states;
-    float *rows;              /* [LANES][3m] */
+    float *rows;              /* [LANES][3m]; where the groom has a base */
     lanes *state;             /* [n_states][3m] the block before and after operators */
     lanes *guide;             /* [3m]; with frame and axis, as in kernel_inputs */
     lanes *frame;             /* [FRAME_WIDTH * m] */
     lanes *axis;              /* [AXIS_WIDTH] */
+    lanes root[3];            /* roots of the strands in the lanes */
+    uint32_t loaded[LANES];   /* whose guide, frame and axis stand in the lanes, one above the number of the operator
+                               * guide: neighbouring blocks mostly share it */
     lanes *scratch;           /* [KERNEL_SCRATCH(m)] */
     lanes *memory;            /* all of it */
     size_t n_memory;

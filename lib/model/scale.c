@@ -1,6 +1,7 @@
 /* Scale: each strand longer or shorter about its root (Chang et al. 2025, Appendix A).
  *   x~_j = x_1 + (1 + eta u)(x_j - x_1); the root is the origin of a block's points. */
 #include "model/kernel.h"
+#include "model/vec.h"
 
 enum { RANDOM_SCALE };
 
@@ -8,10 +9,9 @@ LANES_INLINE void scale_forward(const struct kernel_inputs *in, const lanes *res
                                 lanes *restrict scratch)
 {
     (void)scratch;
-    lanes factor;
-    FOR_LANES(l) factor[l] = 1.0f + in->parameter[RANDOM_SCALE] * in->random[0][l];
+    vec factor = 1.0f + in->parameter[RANDOM_SCALE] * vec_load(in->random[0]);
     for (uint32_t i = 0; i < 3 * in->m; i++)
-        FOR_LANES(l) y[i][l] = factor[l] * x[i][l];
+        vec_store(y[i], factor * vec_load(x[i]));
 }
 
 LANES_INLINE void scale_backward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,

@@ -4,6 +4,7 @@
 
 #include "model/lanes.h"
 #include "model/noise.h"
+#include "model/vec.h"
 #include "tests/support/test.h"
 
 /* Distance in units of the last place of the true value as a float. */
@@ -14,18 +15,21 @@ static double ulps(float got, double truth)
     return fabs(got - truth) / unit;
 }
 
-START_TEST(exp_is_within_two_ulps)
+START_TEST(exp2_is_within_three_ulps)
 {
     double worst = 0.0;
-    for (int i = -860000; i <= 870000; i += 7) {
+    for (int i = -1260000; i <= 1270000; i += 3) {
         float x = (float)i * 1e-4f;
-        worst = fmax(worst, ulps(lane_exp(x), exp((double)x)));
+        worst = fmax(worst, ulps(lane_exp2(x), exp2((double)x)));
     }
-    ck_assert_double_lt(worst, 2.0);
-    ck_assert(lane_exp(0.0f) == 1.0f);
-    ck_assert(lane_exp(-0.0f) == 1.0f);
-    ck_assert(lane_exp(-1e30f) >= 0.0f && lane_exp(-1e30f) < 1e-37f);
-    ck_assert_double_lt(fabs((double)lane_sigmoid(-3.0f) - 1.0 / (1.0 + exp(3.0))), 1e-8);
+    ck_assert_double_lt(worst, 3.0);
+    ck_assert(lane_exp2(0.0f) == 1.0f);
+    ck_assert(lane_exp2(-0.0f) == 1.0f);
+    ck_assert(lane_exp2(-1e30f) >= 0.0f && lane_exp2(-1e30f) < 1.2e-38f);
+    for (int i = 0; i <= 1000; i++) {
+        float v = (float)i * 1e-3f;
+        ck_assert_double_lt(fabs(lane_begun(v, 0.3f) - 1.0 / (1.0 + exp(-10.0 * ((double)v - 0.3f)))), 3e-7);
+    }
 }
 END_TEST
 
@@ -79,5 +83,48 @@ START_TEST(noise_has_its_moments_and_its_slope)
 }
 END_TEST
 
-TEST_SUITE("model_math", exp_is_within_two_ulps, sincos_is_within_two_parts_in_ten_million,
+static void same_bits(vec got, const float *wanted)
+{
+    lanes bits;
+    vec_store(bits, got);
+    ck_assert_mem_eq(bits, wanted, sizeof bits);
+}
+
+START_TEST(vectors_are_the_same_bits_as_lanes)
+{
+    float *gradient = malloc((NOISE_CELLS + 1) * sizeof *gradient);
+    noise_fill(gradient);
+    for (int i = 0; i < 200000; i++) {
+        lanes x, sine, cosine, power, begun, inverse, noise, floors, limited;
+        int32_t cell;
+        for (int l = 0; l < LANES; l++) {
+            x[l] = (float)(i * LANES + l) * 2.741e-4f * (l & 1 && i % 3 ? -1.0f : 1.0f);
+            lane_sincos_turns(x[l], &sine[l], &cosine[l]);
+            power[l] = lane_exp2(0.5f * x[l]);
+            begun[l] = lane_begun(x[l] * 1e-2f, 0.4f);
+            inverse[l] = lane_inverse(x[l]);
+            noise[l] = noise_epsilon(fabsf(x[l])); /* up to 439: all within the table */
+            floors[l] = lane_floor(x[l], &cell);
+            ck_assert_int_eq(cell, (int)floor((double)x[l]));
+            limited[l] = at_least(at_most(x[l], 7.0f), -2.0f);
+        }
+        vec v = vec_load(x), s, c;
+        ivec cells;
+        vec_sincos_turns(v, &s, &c);
+        same_bits(s, sine);
+        same_bits(c, cosine);
+        same_bits(vec_exp2(0.5f * v), power);
+        same_bits(vec_begun(v * 1e-2f, 0.4f), begun);
+        same_bits(vec_inverse(v), inverse);
+        same_bits(vec_floor(v, &cells), floors);
+        same_bits(vec_at_least(vec_at_most(v, 7.0f), -2.0f), limited);
+        vec place = vec_choose(v < 0.0f, -v, v);
+        same_bits(vec_epsilon(gradient, place), noise);
+        same_bits(vec_epsilon(NULL, place), noise);
+    }
+    free(gradient);
+}
+END_TEST
+
+TEST_SUITE("model_math", exp2_is_within_three_ulps, vectors_are_the_same_bits_as_lanes, sincos_is_within_two_parts_in_ten_million,
            noise_is_what_documents_mean_by_it, noise_has_its_moments_and_its_slope)
