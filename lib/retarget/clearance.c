@@ -20,18 +20,32 @@ struct place {
     struct vec out;
 };
 
-/* Distances of points that are surely more than `enough` outside are not asked for: INFINITY. */
-static struct place place_of(const struct job *job, const float p[3], double enough)
+/* A walk along a strand: where the last point was that was measured, and how far outside. */
+struct walk {
+    float p[3];
+    double outside;
+};
+
+static struct walk walk_begin(void) { return (struct walk){{0, 0, 0}, -INFINITY}; }
+
+static double apart(const float a[3], const float b[3]) { return vec_length(vec_sub(vec_of(a), vec_of(b))); }
+
+/* Points that are surely more than `enough` outside are not asked for: INFINITY. From a point that is far enough
+ * outside the next ones on the strand are, too. */
+static struct place place_of(const struct job *job, const float p[3], double enough, struct walk *walk)
 {
     struct groom_surface_point near;
     struct place place = {INFINITY, {0, 0, 0}};
-    if (field_away(&job->field, p) > enough || !groom_bvh_closest(job->bvh, p, INFINITY, &near))
+    if (walk->outside - apart(walk->p, p) > enough || field_away(&job->field, p) > enough)
+        return place;
+    place.outside = field_signed(&job->field, p, &near);
+    memcpy(walk->p, p, sizeof walk->p);
+    walk->outside = 0.99999 * place.outside;
+    if (place.outside == INFINITY)
         return place;
     struct vec d = vec_sub(vec_of(p), vec_of(near.position)), normal = vec_of(near.normal);
     double distance = vec_length(d);
-    int inside = groom_bvh_inside(job->bvh, p);
-    place.outside = inside ? -distance : distance;
-    place.out = distance > 1e-7 ? vec_scale(d, (inside ? -1 : 1) / distance) : normal;
+    place.out = distance > 1e-7 ? vec_scale(d, (place.outside < 0 ? -1 : 1) / distance) : normal;
     return place;
 }
 
@@ -48,14 +62,31 @@ static void middle(const float a[3], const float b[3], float out[3])
         out[c] = 0.5f * (a[c] + b[c]);
 }
 
+/* --- counting ---------------------------------------------------------------------------------- */
+
+static void count_strand(const struct job *job, const float (*p)[3], uint32_t n, struct groom_retarget_inside *inside)
+{
+    struct walk walk = walk_begin();
+    for (uint32_t i = 0; i + 1 < n; i++) {
+        float m[3];
+        middle(p[i], p[i + 1], m);
+        struct place between = place_of(job, m, 0, &walk), at = place_of(job, p[i + 1], job->options->clearance, &walk);
+        inside->near_vertices += at.outside < job->options->clearance;
+        inside->vertices += at.outside < 0;
+        inside->segments += between.outside < 0;
+        inside->deepest = fmax(inside->deepest, -at.outside);
+    }
+}
+
 /* --- pushing -------------------------------------------------------------------------------- */
 
 static int clear_vertices(const struct job *job, float (*p)[3], uint32_t n, double effort)
 {
     double clearance = job->options->clearance;
+    struct walk walk = walk_begin();
     int n_pushed = 0;
     for (uint32_t i = 1; i < n; i++) {
-        struct place place = place_of(job, p[i], clearance);
+        struct place place = place_of(job, p[i], clearance, &walk);
         if (place.outside >= clearance)
             continue;
         push(p[i], place.out, effort * (BEYOND * clearance - place.outside));
@@ -66,12 +97,13 @@ static int clear_vertices(const struct job *job, float (*p)[3], uint32_t n, doub
 
 static int clear_middles(const struct job *job, float (*p)[3], uint32_t n, double effort)
 {
+    struct walk walk = walk_begin();
     int n_pushed = 0;
     for (uint32_t i = 0; i + 1 < n; i++) {
         double wanted = job->options->clearance * (i ? 1 : ROOT_SEGMENT), way;
         float m[3];
         middle(p[i], p[i + 1], m);
-        struct place place = place_of(job, m, wanted);
+        struct place place = place_of(job, m, wanted, &walk);
         if (place.outside >= wanted)
             continue;
         way = effort * (BEYOND * wanted - place.outside);
@@ -94,7 +126,8 @@ static int may_touch(const struct job *job, const float (*p)[3], uint32_t n)
     return 0;
 }
 
-static void clear_strand(const struct job *job, float (*p)[3], uint32_t n)
+/* returns 1 where nothing is left that is too near */
+static int clear_strand(const struct job *job, float (*p)[3], uint32_t n)
 {
     if (!may_touch(job, (const float(*)[3])p, n))
         n = 2; /* but for the segment at the root */
@@ -103,75 +136,61 @@ static void clear_strand(const struct job *job, float (*p)[3], uint32_t n)
         int n_pushed = clear_vertices(job, p, n, effort);
         n_pushed += clear_middles(job, p, n, effort);
         if (n_pushed == 0)
-            break;
+            return 1;
     }
+    return 0;
 }
+
+/* --- all strands --------------------------------------------------------------------------------- */
 
 struct clearing {
     struct job *job;
     float (*points)[3];
-    const float (*counted)[3];
+    int push;
     struct groom_retarget_inside *inside; /* [pieces] */
 };
 
+/* What was cleared to the end has nothing to count. */
 static void clear_piece(void *user, uint32_t piece, uint32_t thread)
 {
     struct clearing *clearing = user;
     const struct groom_strands *strands = clearing->job->source->strands;
     (void)thread;
-    for (uint32_t i = piece * PIECE; i < strands->n_strands && i - piece * PIECE < PIECE; i++)
-        clear_strand(clearing->job, clearing->points + strands->first[i], strands->first[i + 1] - strands->first[i]);
-}
-
-groom_status clearance_apply(struct job *job, float (*points)[3], struct groom_diag *diag)
-{
-    struct clearing clearing = {.job = job, .points = points};
-    (void)diag;
-    parallel_for(job->context, job->source->strands->n_strands / PIECE + 1, clear_piece, &clearing);
-    return GROOM_OK;
-}
-
-/* --- counting ---------------------------------------------------------------------------------- */
-
-static void count_strand(const struct job *job, const float (*p)[3], uint32_t n, struct groom_retarget_inside *inside)
-{
-    for (uint32_t i = 0; i + 1 < n; i++) {
-        float m[3];
-        middle(p[i], p[i + 1], m);
-        struct place at = place_of(job, p[i + 1], job->options->clearance), between = place_of(job, m, 0);
-        inside->near_vertices += at.outside < job->options->clearance;
-        inside->vertices += at.outside < 0;
-        inside->segments += between.outside < 0;
-        inside->deepest = fmax(inside->deepest, -at.outside);
+    clearing->inside[piece] = (struct groom_retarget_inside){0};
+    for (uint32_t i = piece * PIECE; i < strands->n_strands && i - piece * PIECE < PIECE; i++) {
+        float(*p)[3] = clearing->points + strands->first[i];
+        uint32_t n = strands->first[i + 1] - strands->first[i];
+        if (!clearing->push || !clear_strand(clearing->job, p, n))
+            count_strand(clearing->job, (const float(*)[3])p, n, &clearing->inside[piece]);
     }
 }
 
-static void count_piece(void *user, uint32_t piece, uint32_t thread)
+static groom_status run(struct clearing *clearing, struct groom_retarget_inside *inside, struct groom_diag *diag)
 {
-    struct clearing *clearing = user;
-    const struct groom_strands *strands = clearing->job->source->strands;
-    (void)thread;
-    clearing->inside[piece] = (struct groom_retarget_inside){0};
-    for (uint32_t i = piece * PIECE; i < strands->n_strands && i - piece * PIECE < PIECE; i++)
-        count_strand(clearing->job, clearing->counted + strands->first[i], strands->first[i + 1] - strands->first[i],
-                     &clearing->inside[piece]);
-}
-
-groom_status clearance_count(struct job *job, const float (*points)[3], struct groom_retarget_inside *inside,
-                             struct groom_diag *diag)
-{
+    struct job *job = clearing->job;
     uint32_t n_pieces = job->source->strands->n_strands / PIECE + 1;
-    struct clearing clearing = {.job = job, .counted = points};
-    if (!(clearing.inside = memory_array(job->allocator, n_pieces, sizeof *clearing.inside)))
+    if (!(clearing->inside = memory_array(job->allocator, n_pieces, sizeof *clearing->inside)))
         return groom_fail(diag, GROOM_ENOMEM, "no memory to count what is inside");
-    parallel_for(job->context, n_pieces, count_piece, &clearing);
+    parallel_for(job->context, n_pieces, clear_piece, clearing);
     *inside = (struct groom_retarget_inside){0};
     for (uint32_t i = 0; i < n_pieces; i++) {
-        inside->vertices += clearing.inside[i].vertices;
-        inside->segments += clearing.inside[i].segments;
-        inside->near_vertices += clearing.inside[i].near_vertices;
-        inside->deepest = fmax(inside->deepest, clearing.inside[i].deepest);
+        inside->vertices += clearing->inside[i].vertices;
+        inside->segments += clearing->inside[i].segments;
+        inside->near_vertices += clearing->inside[i].near_vertices;
+        inside->deepest = fmax(inside->deepest, clearing->inside[i].deepest);
     }
-    memory_release(job->allocator, clearing.inside, n_pieces, sizeof *clearing.inside);
+    memory_release(job->allocator, clearing->inside, n_pieces, sizeof *clearing->inside);
     return GROOM_OK;
+}
+
+groom_status clearance_apply(struct job *job, float (*points)[3], struct groom_retarget_inside *left, struct groom_diag *diag)
+{
+    struct clearing clearing = {.job = job, .points = points, .push = 1};
+    return run(&clearing, left, diag);
+}
+
+groom_status clearance_count(struct job *job, float (*points)[3], struct groom_retarget_inside *inside, struct groom_diag *diag)
+{
+    struct clearing clearing = {.job = job, .points = points};
+    return run(&clearing, inside, diag);
 }

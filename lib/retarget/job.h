@@ -84,10 +84,9 @@ float contact_away(const struct job *job, const float p[3]);
 
 /* --- the exact last pass (clearance.c) --------------------------------------------------- */
 
-/* Moves what is too near out of the body. points [n_vertices] in metres; roots stay. */
-groom_status clearance_apply(struct job *job, float (*points)[3], struct groom_diag *diag);
-/* Counts what is inside. */
-groom_status clearance_count(struct job *job, const float (*points)[3], struct groom_retarget_inside *inside,
-                             struct groom_diag *diag);
+/* Moves what is too near out of the body; roots stay. points [n_vertices] in metres; left: what could not be moved out. */
+groom_status clearance_apply(struct job *job, float (*points)[3], struct groom_retarget_inside *left, struct groom_diag *diag);
+/* Counts what is inside. points are as they were. */
+groom_status clearance_count(struct job *job, float (*points)[3], struct groom_retarget_inside *inside, struct groom_diag *diag);
 
 #endif

@@ -343,11 +343,9 @@ static groom_status finish(struct job *job, float (*points)[3], const struct gro
     double start = now();
     groom_status st;
     to_metres(job, points);
-    if ((st = clearance_apply(job, points, diag)) != GROOM_OK)
+    if ((st = clearance_apply(job, points, &job->report->inside_after, diag)) != GROOM_OK)
         return st;
     job->report->seconds_clearance = now() - start;
-    if ((st = clearance_count(job, (const float(*)[3])points, &job->report->inside_after, diag)) != GROOM_OK)
-        return st;
     fill_values(job, (const float(*)[3])points, values);
     return measure_lengths(job, (const float(*)[3])points, diag);
 }
@@ -358,7 +356,7 @@ static groom_status count_before(struct job *job, float (*room)[3], struct groom
     for (uint32_t i = 0; i < job->source->strands->n_vertices; i++)
         for (int c = 0; c < 3; c++)
             room[i][c] = (float)(job->hat[i][c] + job->centre[c]);
-    return clearance_count(job, (const float(*)[3])room, &job->report->inside_before, diag);
+    return clearance_count(job, room, &job->report->inside_before, diag);
 }
 
 groom_status groom_retarget_run(const struct groom_retarget_source *source, const struct groom_retarget_target *target,
