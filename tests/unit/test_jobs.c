@@ -594,6 +594,12 @@ START_TEST(a_poison_job_fails_with_its_history_and_last_words)
     }
     cJSON_Delete(error);
     store_job_finish(&job);
+    /* each waited twice as long as the one before */
+    struct store_attempt_list rows;
+    ck_ok(store_attempts_list(store, id, &rows, &diag));
+    for (uint32_t i = 1; i < 3; i++)
+        ck_assert_int_ge(rows.items[i].started_ms - rows.items[i - 1].finished_ms, (int)(quick.backoff_ms << (i - 1)));
+    store_attempt_list_finish(&rows);
     struct supervisor_counts counts;
     supervisor_drain(supervisor, 1000); /* it counts after it has written */
     supervisor_count(supervisor, &counts);
