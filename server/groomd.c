@@ -208,14 +208,14 @@ static groom_status open_uploads(struct daemon *daemon, struct groom_diag *diag)
 
 static groom_status open_state(struct daemon *daemon, struct groom_diag *diag)
 {
-    char path[PATH_SIZE];
+    char path[PATH_SIZE], place[STORE_PLACE_SIZE];
     groom_status status;
     uint64_t n_removed = 0;
     snprintf(path, sizeof path, "%s/blobs", daemon->config.data);
     if ((status = blobs_open(path, NULL, &daemon->blobs, diag)) != GROOM_OK)
         return status;
-    snprintf(path, sizeof path, "%s/groomd.db", daemon->config.data);
-    if ((status = store_open(path, &daemon->store, diag)) != GROOM_OK ||
+    store_place(daemon->config.data, place);
+    if ((status = store_open(place, &daemon->store, diag)) != GROOM_OK ||
         (status = jobs_create(daemon->store, daemon->blobs, &daemon->jobs, diag)) != GROOM_OK)
         return status;
     status = jobs_collect_blobs(daemon->jobs, &n_removed, diag);

@@ -6,8 +6,27 @@
 #include <string.h>
 #include <sys/random.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "server/store/database.h"
+
+/* --- where it is ---------------------------------------------------------------------- */
+
+#define FILE_NAME "groomd.db" /* beside it, SQLite's own: groomd.db-wal, groomd.db-shm */
+
+void store_place(const char *folder, char place[STORE_PLACE_SIZE])
+{
+    snprintf(place, STORE_PLACE_SIZE, "%s/" FILE_NAME, folder);
+}
+
+bool store_is_in(const char *folder)
+{
+    char place[STORE_PLACE_SIZE];
+    store_place(folder, place);
+    return access(place, F_OK) == 0;
+}
+
+bool store_has_entry(const char *name) { return !strncmp(name, FILE_NAME, sizeof FILE_NAME - 1); }
 
 /* --- opening ------------------------------------------------------------------------- */
 

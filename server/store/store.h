@@ -1,8 +1,18 @@
 /* What groomd remembers: uploads, jobs and their attempts, grooms and their revisions.
  *
  * One interface in front of a database that the daemon alone owns (SQLite in WAL mode with
- * synchronous=FULL; nothing here names SQL, so that another backend fits behind it). A call that
- * returned GROOM_OK is on the disk. A call is one transaction: after a crash it has happened or not.
+ * synchronous=FULL). A call that returned GROOM_OK is on the disk. A call is one transaction: after a crash
+ * it has happened or not.
+ *
+ * A second backend (PostgreSQL, for several daemons) fits behind this without touching a caller, who knows no
+ * SQL, no connection and no file of it (tests/lint.sh sees to that), and who may not suppose more than is said here:
+ *   - what is taken (store_job_take, store_webhook_take) is the taker's alone, whoever else takes at that moment;
+ *   - sequences and `next` only grow, without being dense;
+ *   - GROOM_ECONFLICT from any write means that another was first: look again;
+ *   - "all that are running" of store_attempts_list are this daemon's own, taken through its store. SQLite has one
+ *     daemon, so it has them all. A backend of several notes in store_job_take which daemon took;
+ *   - a change that another daemon made wakes nobody here: such a backend calls jobs_notify for what it hears
+ *     (LISTEN), from a thread of its own.
  *
  * threads   every function may be called from any thread; writes take turns, reads wait for no write
  * blocking  a write waits for the disk (a few ms): call from service threads, not from an event loop
@@ -32,7 +42,15 @@
 
 struct store;
 
-/* Open or make the database file `path`, mend it to the present schema, check it.
+#define STORE_PLACE_SIZE 1400
+/* Where the state of a data folder is: for SQLite a file in it. What the functions here call `path`. */
+void store_place(const char *folder, char place[STORE_PLACE_SIZE]);
+/* Is there state in the folder? */
+bool store_is_in(const char *folder);
+/* Does this entry of a data folder hold state? Then it is copied by store_copy, not as a file. */
+bool store_has_entry(const char *name);
+
+/* Open or make the database at `path`, mend it to the present schema, check it.
  * returns  GROOM_EFORMAT (not a database, damaged, or of a newer schema: detail says which) */
 GROOM_MUST_CHECK groom_status store_open(const char *path, struct store **store, struct groom_diag *diag);
 void store_close(struct store *store); /* takes NULL */

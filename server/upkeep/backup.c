@@ -15,7 +15,7 @@
 struct backup {
     const struct upkeep *upkeep;
     bool copy;
-    char to[PATH_SIZE], database[PATH_SIZE + 32]; /* the folder while it is being made */
+    char to[PATH_SIZE], database[STORE_PLACE_SIZE]; /* the folder while it is being made */
     char last[BLOBS_HASH_SIZE], last_folder[3];
     uint64_t n_blobs, n_linked, n_bytes, n_uploads;
     char (*gone)[STORE_ID_SIZE]; /* uploads that are not there any more */
@@ -133,7 +133,7 @@ static void on_upload(void *user, const char *id, uint64_t n_durable)
 /* Tokens and the like: small files beside the database. */
 static bool is_ours(const char *name)
 {
-    return name[0] != '.' && strcmp(name, "lock") && strncmp(name, "groomd.db", 9) && strcmp(name, "control");
+    return name[0] != '.' && strcmp(name, "lock") && !store_has_entry(name) && strcmp(name, "control");
 }
 
 static groom_status copy_others(struct backup *backup)
@@ -173,13 +173,13 @@ static groom_status make_folders(struct backup *backup)
 
 static groom_status fill(struct backup *backup)
 {
-    char from[PATH_SIZE];
+    char from[STORE_PLACE_SIZE];
     const struct store_check_sink sink = {NULL, on_blob, on_upload, backup};
     struct store *store = backup->upkeep->store;
     groom_status status = make_folders(backup);
     if (status != GROOM_OK)
         return status;
-    snprintf(from, sizeof from, "%s/groomd.db", backup->upkeep->folder);
+    store_place(backup->upkeep->folder, from);
     status = store ? store_copy(store, backup->database, backup->diag)
                    : store_copy_file(from, backup->database, backup->diag);
     if (status == GROOM_OK)
@@ -228,7 +228,7 @@ groom_status upkeep_backup(const struct upkeep *upkeep, const char *to, bool cop
         return groom_fail(diag, GROOM_ECONFLICT, "%.300s is there already: name a new folder", to);
     if ((size_t)snprintf(backup.to, sizeof backup.to, "%s.partial", to) >= sizeof backup.to)
         return groom_fail(diag, GROOM_EINVAL, "the name of the folder is too long");
-    snprintf(backup.database, sizeof backup.database, "%s/groomd.db", backup.to);
+    store_place(backup.to, backup.database);
     if (access(backup.to, F_OK) == 0)
         return groom_fail(diag, GROOM_ECONFLICT, "%.300s is left from a backup that was cut off: remove it", backup.to);
     blobs_hold(upkeep->blobs);

@@ -133,9 +133,9 @@ static groom_status check_copy(struct checking *checking, const char *path, stru
 groom_status upkeep_check(const struct upkeep *upkeep, uint64_t *n_problems, struct groom_diag *diag)
 {
     struct checking checking = {.upkeep = upkeep};
-    char path[PATH_SIZE], from[PATH_SIZE];
+    char path[PATH_SIZE], from[STORE_PLACE_SIZE];
     snprintf(path, sizeof path, "%s/tmp/check.db", upkeep->folder);
-    snprintf(from, sizeof from, "%s/groomd.db", upkeep->folder);
+    store_place(upkeep->folder, from);
     store_copy_remove(path);
     blobs_hold(upkeep->blobs);
     groom_status status =

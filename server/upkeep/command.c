@@ -74,9 +74,7 @@ static bool take_arguments(struct command *command, int argc, char **argv, char 
 static groom_status lock_folder(const char *folder, int *fd, struct groom_diag *diag)
 {
     char path[PATH_SIZE];
-    struct stat info;
-    snprintf(path, sizeof path, "%s/groomd.db", folder);
-    if (stat(path, &info) != 0)
+    if (!store_is_in(folder))
         return groom_fail(diag, GROOM_ENOTFOUND, "%.300s is no data folder: %s", folder, strerror(errno));
     snprintf(path, sizeof path, "%s/lock", folder);
     *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
