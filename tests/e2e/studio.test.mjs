@@ -3,7 +3,7 @@
 import test from 'node:test';
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
-import { readFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { build, startDaemon, temporaryFolder } from '../support/daemon.mjs';
 import { hasBrowser, picture, startBrowser } from '../support/browser.mjs';
@@ -100,6 +100,29 @@ test('from files to a groom, a knob, back, and home', { skip, timeout: 300000 },
     }
     assert.deepEqual(file, points);
     assert.match(await page.locator('.line code').first().textContent(), /^curl 'http:.*format=data/);
+  });
+  await t.test('what was done is listed as lines for a shell', async () => {
+    await page.locator('.commands summary').click();
+    const listed = await page.locator('.commands code').allTextContents(), server = daemon.url.replaceAll('.', '\\.');
+    for (const words of ['upload strands\\.hair', 'upload-head head\\.obj', 'fit str_\\w+ --head head_\\w+ --quality draft', 'set grm_\\w+ /operators/\\d/radius=0\\.014', 'revert grm_\\w+ 1', 'export grm_\\w+ --format data'])
+      assert.ok(listed.some((line) => new RegExp(`^groomctl --server ${server} ${words}`).test(line)), `${words}\n${listed.join('\n')}`);
+    assert.ok(listed.some((line) => /set-guides grm_/.test(line)));
+    assert.equal(listed.filter((line) => line.startsWith('curl')).length * 2, listed.length);
+    await picture(page, 'studio-commands');
+    await page.locator('.commands summary').click();
+  });
+  await t.test('the server draws what the page shows', async () => {
+    await page.waitForFunction(() => {
+      const { canvas } = window.studio.viewer, [width, height] = new URL(document.querySelector('form[aria-label=Picture] a').href).searchParams.get('size').split('x');
+      return Math.abs(width / height - canvas.clientWidth / canvas.clientHeight) < 0.01;
+    });
+    const { href, sizes } = await page.evaluate(() => ({ href: document.querySelector('form[aria-label=Picture] a').href, sizes: [window.studio.viewer.canvas.clientWidth, window.studio.viewer.canvas.clientHeight] }));
+    const drawing = await daemon.fetch(href), bytes = Buffer.from(await drawing.arrayBuffer());
+    assert.equal(drawing.status, 200);
+    assert.ok(Math.abs(bytes.readUInt32BE(16) / bytes.readUInt32BE(20) - sizes[0] / sizes[1]) < 0.01, 'the page’s shape');
+    writeFileSync(join(build, 'tests/pictures/studio-drawn-by-the-server.png'), bytes);
+    await page.locator('select[name=from]').selectOption('turn');
+    assert.match(await page.evaluate(() => document.querySelector('form[aria-label=Picture] a').href), /turntable\.png\?frames=36/);
   });
   await t.test('target and groom stand side by side', async () => {
     await page.getByLabel('compare').selectOption('side by side');

@@ -1,4 +1,5 @@
 /* The daemon's calls. A refusal is thrown as its problem document (RFC 9457). */
+import { tell } from './commands.mjs';
 
 export class Problem extends Error {
     constructor(status, problem) {
@@ -23,6 +24,7 @@ export async function call(method, path, { body, headers = {}, type = 'applicati
     });
     if (!response.ok) await refuse(response);
     const json = /json/.test(response.headers.get('content-type') ?? '') ? await response.json() : undefined;
+    if (method !== 'GET') tell({ method, path, body, headers, type, answer: json });
     return { json, etag: response.headers.get('etag'), response };
 }
 
@@ -44,7 +46,7 @@ export function upload(path, file, on_progress) {
         request.onload = () => {
             let json = {};
             try { json = JSON.parse(request.responseText); } catch { /* told below */ }
-            if (request.status < 300) resolve(json);
+            if (request.status < 300) { tell({ method: 'POST', path, file: file.name, answer: json }); resolve(json); }
             else reject(new Problem(request.status, json));
         };
         request.send(file);

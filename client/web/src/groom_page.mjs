@@ -1,10 +1,11 @@
 /* One groom: the picture on the left, the work on the right. */
 import { EngineThread } from './engine_thread.mjs';
-import { action, by_id, element, notice, say, whole } from './dom.mjs';
+import { by_id, element, notice, say, whole } from './dom.mjs';
 import { GuideEditor } from './guide_editor.mjs';
 import { Session } from './session.mjs';
 import { arrayOf, fetchHead, fetchStrands } from './strands.mjs';
 import { exportPanel } from './panels/export.mjs';
+import { picturePanel } from './panels/picture.mjs';
 import { historyPanel } from './panels/history.mjs';
 import { operatorsPanel } from './panels/operators.mjs';
 import { sculptPanel } from './panels/sculpt.mjs';
@@ -107,9 +108,7 @@ export async function groomPage(main, id, strands = AT_FIRST) {
     const armature = sculptPanel(work, session, viewer);
     historyPanel(work, session);
     exportPanel(work, session);
-    work.append(element('section', { class: 'panel' }, element('h2', {}, 'Picture'),
-        element('div', { class: 'row' }, action('save what is shown', () => viewer.canvas.toBlob((blob) => window.open(URL.createObjectURL(blob)))),
-            element('a', { class: 'button', href: `/v1/grooms/${id}/preview.png?size=1024`, target: '_blank' }, 'rendered by the server'))));
+    picturePanel(work, session, viewer);
     await evaluation.request();
     viewer.frame(boxOf(evaluation.strands));
     viewer.look('front');

@@ -6,6 +6,7 @@ import { by_id, element, notice } from './dom.mjs';
 import { groomPage } from './groom_page.mjs';
 import { jobPage } from './job_page.mjs';
 import { libraryPage } from './library_page.mjs';
+import { commandsPanel } from './panels/commands.mjs';
 
 const PAGES = [[/^#\/grooms\/(grm_\w+)(?:\?strands=(\d+))?$/, groomPage], [/^#\/jobs\/(job_\w+)$/, jobPage], [/^/, libraryPage]];
 let leave = () => {}, turn = 0;
@@ -27,4 +28,5 @@ async function show() {
 }
 
 window.addEventListener('hashchange', show);
+document.body.append(commandsPanel());
 show();
