@@ -27,11 +27,25 @@
  *                                      iterations_max unfinished contact_checked contact_entered
  *                                      contact_inside contact_depth_before contact_depth_after
  *
+ * Of a retargeting (kind "retarget"):
+ *   GET  /v1/work/groom                200 the groom document that is carried, its arrays inline
+ *   GET  /v1/work/strands              200 the groom's strands, where it is carried "dense": HAIR, metres
+ *   PUT  /v1/work/preparation          2xx; body application/octet-stream: what the attempt has worked out of
+ *                                      its source alone, where the order's "preparation" is null
+ *   POST /v1/work/result               2xx; body: for each target, in their order, a line
+ *                                      {"kind":"strands"|"groom","bytes":N,"report":{…},
+ *                                       "source_skeleton":{…},"skeleton":{…},"hairline":{…}?,
+ *                                       "strands":{"movement","depth","stretch": f32[n]}}
+ *                                      and behind it N bytes: the strands as HAIR, or a groom document.
+ *                                      Skeletons are those that were used, made or given
+ *
  * The order:
  *   {"job":"job_...","kind":"fit","attempt":1,"options":{...},"request":{...},
  *    "inputs":{"strands":{"id","sha256","bytes","format","unit_m","up","name","path"?},
- *              "head":{the same}|null},
- *    "checkpoint":{"sha256","bytes","stage","path"?}|null}
+ *              "head":{the same}|null,
+ *              "source":{the same},"targets":[{the same},...]},   of a retargeting
+ *    "checkpoint":{"sha256","bytes","stage","path"?}|null,
+ *    "preparation":{"sha256","bytes","path"?}|null}               of jobs that keep one
  * `format` may be "" or missing: recognise it. `path` is the file where daemon and worker share a
  * folder. Bytes are verified against sha256 wherever they come from.
  *
@@ -59,7 +73,9 @@
 #define WORK_PATH_LAYER      "/v1/work/layer"
 #define WORK_PATH_STRANDS    "/v1/work/strands"
 #define WORK_PATH_BLOBS      "/v1/work/blobs" /* "/{sha256}" */
+#define WORK_PATH_GROOM      "/v1/work/groom"
 #define WORK_PATH_CHECKPOINT "/v1/work/checkpoint"
+#define WORK_PATH_PREPARATION "/v1/work/preparation"
 #define WORK_PATH_PROGRESS   "/v1/work/progress"
 #define WORK_PATH_RESULT     "/v1/work/result"
 #define WORK_PATH_FAILED     "/v1/work/failed"

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "groom/fit.h"
+#include "groom/retarget.h"
 #include "proto/embed.h"
 #include "server/http/handlers.h"
 #include "server/http/server.h"
@@ -30,17 +31,18 @@ void about_openapi(struct request *request)
 
 void about_options(struct request *request)
 {
-    char *schema, *text = NULL;
+    char *fit = NULL, *retarget = NULL, *text = NULL;
     struct groom_diag diag = {0};
-    groom_status status = groom_fit_options_schema(&schema, &diag);
-    if (status != GROOM_OK) {
+    int n = -1;
+    groom_status status = groom_fit_options_schema(&fit, &diag);
+    if (status == GROOM_OK)
+        status = groom_retarget_options_schema(&retarget, &diag);
+    if (status == GROOM_OK && (n = asprintf(&text, "{\"fit\":%s,\"retarget\":%s}", fit, retarget)) < 0)
+        status = GROOM_ENOMEM;
+    free(fit);
+    free(retarget);
+    if (status != GROOM_OK)
         respond_failure(request, status, &diag);
-        return;
-    }
-    int n = asprintf(&text, "{\"fit\":%s}", schema);
-    free(schema);
-    if (n < 0)
-        respond_failure(request, GROOM_ENOMEM, NULL);
     else
         respond_bytes(request, 200, "application/json", text, (size_t)n);
 }

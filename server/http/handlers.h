@@ -108,6 +108,8 @@ void pictures_call_turntable(struct request *request);
 
 /* layer_calls.c */
 void work_call_layer(struct request *request);
+void work_call_groom(struct request *request);       /* retarget_work.c */
+void work_call_preparation(struct request *request); /* retarget_work.c */
 void work_call_strands(struct request *request);
 void layers_call_ruffle(struct request *request);
 void layers_call_sculpt(struct request *request);

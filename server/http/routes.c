@@ -76,6 +76,8 @@ const struct route http_routes[] = {
     {"GET", "/v1/work/blobs/{sha256}", work_call_blob, BODY_NONE, LANE_FAST, "", ROUTE_WORK, NULL},
     {"GET", "/v1/work/layer", work_call_layer, BODY_NONE, LANE_SLOW, "", ROUTE_WORK, NULL},
     {"GET", "/v1/work/strands", work_call_strands, BODY_NONE, LANE_SLOW, "", ROUTE_WORK, NULL},
+    {"GET", "/v1/work/groom", work_call_groom, BODY_NONE, LANE_SLOW, "", ROUTE_WORK, NULL},
+    {"PUT", "/v1/work/preparation", work_call_preparation, BODY_BLOB, LANE_SLOW, "", ROUTE_WORK, NULL},
     {"POST", "/v1/work/progress", work_call_progress, BODY_MEMORY, LANE_FAST, "", ROUTE_WORK | ROUTE_QUIET, NULL},
     {"PUT", "/v1/work/checkpoint", work_call_checkpoint, BODY_BLOB, LANE_SLOW, "stage", ROUTE_WORK, work_check_stage},
     {"POST", "/v1/work/result", work_call_result, BODY_FILE, LANE_SLOW, "", ROUTE_WORK, NULL},

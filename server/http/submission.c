@@ -9,7 +9,7 @@
 #include "server/http/webhook_calls.h"
 #include "server/jobs/jobs.h"
 
-static const struct job_kind *const kinds[] = {&job_kind_fit};
+static const struct job_kind *const kinds[] = {&job_kind_fit, &job_kind_retarget};
 #define N_KINDS (sizeof kinds / sizeof kinds[0])
 
 /* --- what all kinds share ------------------------------------------------------------------ */

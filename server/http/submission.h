@@ -25,7 +25,7 @@ struct job_kind {
     groom_status (*complete_options)(const char *json, size_t n, char **complete, struct groom_diag *diag);
 };
 
-extern const struct job_kind job_kind_fit;
+extern const struct job_kind job_kind_fit, job_kind_retarget;
 
 /* Copies the id of an upload from object[key] to inputs[key], where that upload is there.
  * pointer  of the field in the body: "/source/head"

@@ -12,6 +12,7 @@
 #include "server/blobs/blobs.h"
 #include "server/grooms/grooms.h"
 #include "server/http/handlers.h"
+#include "server/http/retarget_work.h"
 #include "server/http/tool.h"
 #include "server/jobs/work.h"
 
@@ -140,8 +141,8 @@ static bool take_edit(struct request *request, struct store_job *job, struct gro
 {
     struct groom_diag diag = {0};
     groom_status status = jobs_get(request->service->jobs, request->attempt.job_id, job, &diag);
-    if (status == GROOM_OK && !strcmp(job->kind, "fit")) {
-        status = groom_fail(&diag, GROOM_ENOTFOUND, "this job is a fit: it has no layer");
+    if (status == GROOM_OK && (!strcmp(job->kind, "fit") || !strcmp(job->kind, "retarget"))) {
+        status = groom_fail(&diag, GROOM_ENOTFOUND, "this job is a %s: it has no layer", job->kind);
         store_job_finish(job);
     }
     if (status != GROOM_OK) {
@@ -207,6 +208,10 @@ void work_call_strands(struct request *request)
     struct store_job job = {0};
     struct grooms_layer_job edit;
     struct groom_diag diag = {0};
+    if (retarget_work_is(request)) {
+        retarget_work_strands(request);
+        return;
+    }
     if (!take_edit(request, &job, &edit))
         return;
     groom_status status = send_strands(request, &edit, &diag);
@@ -222,7 +227,7 @@ static groom_status store_edited(void *user, const struct store_revision_new *ne
     return work_edited(request->service->jobs, &request->attempt, next, expected, answer, diag);
 }
 
-/* A fit hands in a document, an edit the strands that it has made. */
+/* A fit hands in a document, an edit the strands that it has made, a retargeting either for each target. */
 static groom_status take_any(struct request *request, const char *bytes, size_t n_bytes, struct groom_diag *diag)
 {
     struct store_job job = {0};
@@ -230,9 +235,12 @@ static groom_status take_any(struct request *request, const char *bytes, size_t 
     if (status != GROOM_OK)
         return status;
     const struct grooms_layer_job edit = {job.kind, job.request, job.options, job.project};
-    status = strcmp(job.kind, "fit")
-                 ? grooms_job_result(request->service->grooms, &edit, bytes, n_bytes, store_edited, request, diag)
-                 : take_result(request, bytes, n_bytes, diag);
+    if (strcmp(job.kind, "fit") == 0)
+        status = take_result(request, bytes, n_bytes, diag);
+    else if (strcmp(job.kind, "retarget") == 0)
+        status = retarget_work_result(request, &job, bytes, n_bytes, diag);
+    else
+        status = grooms_job_result(request->service->grooms, &edit, bytes, n_bytes, store_edited, request, diag);
     store_job_finish(&job);
     return status;
 }

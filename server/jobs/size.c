@@ -30,20 +30,45 @@ static const cJSON *member(const cJSON *object, const char *name)
     return cJSON_GetObjectItemCaseSensitive(object, name);
 }
 
-static uint64_t count_vertices(struct jobs *jobs, const cJSON *request)
+static double number(const cJSON *object, const char *name)
+{
+    const cJSON *item = member(object, name);
+    return cJSON_IsNumber(item) && item->valuedouble > 0 ? item->valuedouble : 0;
+}
+
+static double vertices_of_upload(struct jobs *jobs, const char *id)
 {
     struct store_asset asset = {0};
-    const char *id = cJSON_GetStringValue(member(request, "strands"));
-    double n = 0;
-    if (!id || store_asset_get(jobs->store, NULL, STORE_STRANDS, id, &asset, NULL) != GROOM_OK)
+    if (store_asset_get(jobs->store, NULL, STORE_STRANDS, id, &asset, NULL) != GROOM_OK)
         return 0;
     cJSON *metadata = cJSON_Parse(asset.metadata);
-    const cJSON *vertices = member(metadata, "vertices");
-    if (cJSON_IsNumber(vertices) && vertices->valuedouble > 0)
-        n = vertices->valuedouble;
+    double n = number(metadata, "vertices");
     cJSON_Delete(metadata);
     store_asset_finish(&asset);
-    return (uint64_t)n;
+    return n;
+}
+
+/* As it is evaluated. */
+static double vertices_of_groom(struct jobs *jobs, const char *id, uint32_t revision)
+{
+    struct store_revision row = {0};
+    if (store_revision_get(jobs->store, id, revision, &row, NULL) != GROOM_OK)
+        return 0;
+    cJSON *document = cJSON_Parse(row.document);
+    const cJSON *strands = member(document, "strands");
+    double n = number(strands, "count") * number(strands, "vertices");
+    cJSON_Delete(document);
+    store_revision_finish(&row);
+    return n;
+}
+
+static uint64_t count_vertices(struct jobs *jobs, const cJSON *request)
+{
+    const char *strands = cJSON_GetStringValue(member(request, "strands")),
+               *groom = cJSON_GetStringValue(member(request, "groom"));
+    if (strands)
+        return (uint64_t)vertices_of_upload(jobs, strands);
+    return groom ? (uint64_t)vertices_of_groom(jobs, groom, (uint32_t)number(request, "revision")) : 0;
 }
 
 struct launch_size size_of_job(struct jobs *jobs, const char *job_id)

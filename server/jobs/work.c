@@ -11,6 +11,8 @@
 
 #include "proto/json_text.h"
 #include "proto/problem.h"
+#include "server/jobs/inputs.h"
+#include "server/jobs/preparation.h"
 #include "server/jobs/queue.h"
 
 /* --- tokens ---------------------------------------------------------------------------- */
@@ -65,60 +67,6 @@ groom_status work_begin(struct jobs *jobs, const struct store_attempt_ref *ref, 
 
 /* --- what is to be done ------------------------------------------------------------------ */
 
-static const struct {
-    const char *name;
-    enum store_asset_kind kind;
-} inputs[] = {{"strands", STORE_STRANDS}, {"head", STORE_HEAD}};
-#define N_INPUTS (sizeof inputs / sizeof inputs[0])
-
-/* The upload that a request names as its ith input; *found false where it names none. */
-static groom_status read_input(struct jobs *jobs, const cJSON *request, size_t i, struct store_asset *asset,
-                               bool *found, struct groom_diag *diag)
-{
-    const cJSON *id = cJSON_GetObjectItemCaseSensitive(request, inputs[i].name);
-    *found = cJSON_IsString(id);
-    return *found ? store_asset_get(jobs->store, NULL, inputs[i].kind, id->valuestring, asset, diag) : GROOM_OK;
-}
-
-/* Where the workers see the blob, if they do. */
-static void add_path(struct jobs *jobs, cJSON *object, const char *sha256)
-{
-    char path[1024];
-    if (!jobs->shared_blobs[0])
-        return;
-    snprintf(path, sizeof path, "%.900s/%.2s/%s", jobs->shared_blobs, sha256, sha256);
-    cJSON_AddStringToObject(object, "path", path);
-}
-
-static void add_input(struct jobs *jobs, cJSON *object, const char *name, const struct store_asset *asset)
-{
-    char up[2] = {asset->up, 0};
-    cJSON *input = cJSON_AddObjectToObject(object, name);
-    cJSON_AddStringToObject(input, "id", asset->id);
-    cJSON_AddStringToObject(input, "sha256", asset->sha256);
-    cJSON_AddNumberToObject(input, "bytes", (double)asset->n_bytes);
-    cJSON_AddStringToObject(input, "format", asset->format);
-    cJSON_AddNumberToObject(input, "unit_m", asset->unit_m);
-    cJSON_AddStringToObject(input, "up", up);
-    cJSON_AddStringToObject(input, "name", asset->name);
-    add_path(jobs, input, asset->sha256);
-}
-
-static groom_status add_inputs(struct jobs *jobs, const cJSON *request, cJSON *object, struct groom_diag *diag)
-{
-    for (size_t i = 0; i < N_INPUTS; i++) {
-        struct store_asset asset = {0};
-        bool found = false;
-        groom_status status = read_input(jobs, request, i, &asset, &found, diag);
-        if (status != GROOM_OK)
-            return status;
-        if (found)
-            add_input(jobs, object, inputs[i].name, &asset);
-        store_asset_finish(&asset);
-    }
-    return GROOM_OK;
-}
-
 static groom_status add_checkpoint(struct jobs *jobs, const char *job_id, cJSON *object, struct groom_diag *diag)
 {
     struct store_checkpoint checkpoint;
@@ -133,7 +81,7 @@ static groom_status add_checkpoint(struct jobs *jobs, const char *job_id, cJSON 
     cJSON_AddStringToObject(item, "sha256", checkpoint.sha256);
     cJSON_AddNumberToObject(item, "bytes", (double)checkpoint.n_bytes);
     cJSON_AddNumberToObject(item, "stage", checkpoint.stage);
-    add_path(jobs, item, checkpoint.sha256);
+    inputs_add_path(jobs, item, checkpoint.sha256);
     return GROOM_OK;
 }
 
@@ -149,10 +97,12 @@ groom_status work_describe(struct jobs *jobs, const struct store_attempt_ref *re
     cJSON_AddStringToObject(object, "kind", job.kind);
     cJSON_AddNumberToObject(object, "attempt", ref->number);
     cJSON_AddItemToObject(object, "options", cJSON_Parse(job.options));
-    status = add_inputs(jobs, request, cJSON_AddObjectToObject(object, "inputs"), diag);
-    cJSON_AddItemToObject(object, "request", request);
+    status = inputs_describe(jobs, request, cJSON_AddObjectToObject(object, "inputs"), diag);
     if (status == GROOM_OK)
         status = add_checkpoint(jobs, job.id, object, diag);
+    if (status == GROOM_OK)
+        status = preparation_describe(jobs, &job, object, diag);
+    cJSON_AddItemToObject(object, "request", request);
     char *printed = status == GROOM_OK ? cJSON_PrintUnformatted(object) : NULL;
     cJSON_Delete(object);
     store_job_finish(&job);
@@ -161,21 +111,6 @@ groom_status work_describe(struct jobs *jobs, const struct store_attempt_ref *re
     if (status == GROOM_OK)
         *text = printed;
     return status;
-}
-
-static groom_status is_input(struct jobs *jobs, const cJSON *request, const char *sha256, bool *is,
-                             struct groom_diag *diag)
-{
-    for (size_t i = 0; i < N_INPUTS; i++) {
-        struct store_asset asset = {0};
-        bool found = false;
-        groom_status status = read_input(jobs, request, i, &asset, &found, diag);
-        if (status != GROOM_OK)
-            return status;
-        *is |= found && strcmp(asset.sha256, sha256) == 0;
-        store_asset_finish(&asset);
-    }
-    return GROOM_OK;
 }
 
 groom_status work_may_read(struct jobs *jobs, const struct store_attempt_ref *ref, const char *sha256,
@@ -188,8 +123,10 @@ groom_status work_may_read(struct jobs *jobs, const struct store_attempt_ref *re
     if (status != GROOM_OK)
         return status;
     cJSON *request = cJSON_Parse(job.request);
-    status = is_input(jobs, request, sha256, &may, diag);
+    status = inputs_have(jobs, request, sha256, &may, diag);
     cJSON_Delete(request);
+    if (status == GROOM_OK && !may)
+        status = preparation_is(jobs, &job, sha256, &may, diag);
     store_job_finish(&job);
     if (status == GROOM_OK && !may &&
         (status = store_checkpoint_get(jobs->store, ref->job_id, &checkpoint, diag)) == GROOM_OK)
@@ -213,6 +150,30 @@ groom_status work_checkpoint(struct jobs *jobs, const struct store_attempt_ref *
     blobs_unpin(jobs->blobs, sha256);
     jobs_drop_blob(jobs, status == GROOM_OK ? replaced : sha256);
     return status;
+}
+
+groom_status work_preparation(struct jobs *jobs, const struct store_attempt_ref *ref, const char *sha256,
+                              uint64_t n_bytes, struct groom_diag *diag)
+{
+    struct store_job job = {0};
+    groom_status status = store_job_get(jobs->store, ref->job_id, &job, diag);
+    if (status == GROOM_OK)
+        status = preparation_keep(jobs, ref, &job, sha256, n_bytes, diag);
+    blobs_unpin(jobs->blobs, sha256);
+    if (status != GROOM_OK)
+        jobs_drop_blob(jobs, sha256);
+    store_job_finish(&job);
+    return status;
+}
+
+groom_status work_made(struct jobs *jobs, const struct store_attempt_ref *ref, const struct work_made *made,
+                       const char *result, struct groom_diag *diag)
+{
+    struct store_job_move move = {.job_id = ref->job_id, .from = STORE_JOB_RUNNING, .to = STORE_JOB_SUCCEEDED,
+                                  .attempt = ref->number, .attempt_state = STORE_ATTEMPT_SUCCEEDED,
+                                  .result = result, .grooms = made->grooms, .n_grooms = made->n_grooms,
+                                  .assets = made->assets, .n_assets = made->n_assets};
+    return jobs_move(jobs, &move, diag);
 }
 
 groom_status work_edited(struct jobs *jobs, const struct store_attempt_ref *ref, const struct store_revision_new *groom,

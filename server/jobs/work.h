@@ -7,7 +7,9 @@
  *   GET  /v1/work/blobs/{sha256}     an input, or the checkpoint              work_may_read, blobs_read
  *   POST /v1/work/progress           where it stands; answers {"cancel":b}    work_progress
  *   PUT  /v1/work/checkpoint?stage=N bytes to go on from                      blobs_…, work_checkpoint
- *   POST /v1/work/result             the groom                                work_result
+ *   PUT  /v1/work/preparation        bytes that the next job with these inputs may start from
+ *                                                                             blobs_…, work_preparation
+ *   POST /v1/work/result             the groom, or what else was made         work_result, work_edited, work_made
  *   POST /v1/work/failed             a problem object: it cannot be done      work_failed
  *   POST /v1/work/ended              {"words"}: the process ends without one  work_ended
  *
@@ -36,13 +38,16 @@ GROOM_MUST_CHECK groom_status work_authenticate(struct jobs *jobs, const char *t
 GROOM_MUST_CHECK groom_status work_begin(struct jobs *jobs, const struct store_attempt_ref *ref,
                                          struct groom_diag *diag);
 /* {"job","kind","attempt","options":{…},"request":{…},
- *  "inputs":{"strands":{"id","sha256","bytes","format","unit_m","up","name"[,"path"]},"head":{…}},
- *  "checkpoint":{"sha256","bytes","stage"[,"path"]} or null}
+ *  "inputs":{"strands":{"id","sha256","bytes","format","unit_m","up","name"[,"path"]},"head":{…},
+ *            "source":{…},"targets":[{…},…]},                  those that the job has
+ *  "checkpoint":{"sha256","bytes","stage"[,"path"]} or null,
+ *  "preparation":{"sha256","bytes"[,"path"]} or null}          of jobs that keep one; null: hand it in
  * with the paths where jobs_share_blobs said that workers see the folder of blobs.
  * *text is malloc'ed. */
 GROOM_MUST_CHECK groom_status work_describe(struct jobs *jobs, const struct store_attempt_ref *ref, char **text,
                                             struct groom_diag *diag);
-/* GROOM_OK where this blob is an input of the attempt's job or its checkpoint; else GROOM_ENOTFOUND. */
+/* GROOM_OK where this blob is an input of the attempt's job, its checkpoint or its preparation; else
+ * GROOM_ENOTFOUND. */
 GROOM_MUST_CHECK groom_status work_may_read(struct jobs *jobs, const struct store_attempt_ref *ref,
                                             const char *sha256, struct groom_diag *diag);
 /* body     {"stage":{"name","index","count"},"progress":0..1,"eta_s":N,
@@ -67,6 +72,20 @@ GROOM_MUST_CHECK groom_status work_result(struct jobs *jobs, const struct store_
 GROOM_MUST_CHECK groom_status work_edited(struct jobs *jobs, const struct store_attempt_ref *ref,
                                           const struct store_revision_new *groom, uint32_t expected, const char *result,
                                           struct groom_diag *diag);
+/* A committed, pinned blob is what the job has worked out of its inputs alone; it is unpinned here, whatever is
+ * returned. returns  GROOM_ECONFLICT, GROOM_EINVAL (jobs of this kind keep none) */
+GROOM_MUST_CHECK groom_status work_preparation(struct jobs *jobs, const struct store_attempt_ref *ref,
+                                               const char *sha256, uint64_t n_bytes, struct groom_diag *diag);
+/* New grooms and the uploads that they stand on; borrowed. */
+struct work_made {
+    const struct store_revision_new *grooms;
+    size_t n_grooms;
+    const struct store_asset *assets; /* their blobs are pinned, the caller's to unpin */
+    size_t n_assets;
+};
+/* As work_result, with several; the result is this JSON object. */
+GROOM_MUST_CHECK groom_status work_made(struct jobs *jobs, const struct store_attempt_ref *ref,
+                                        const struct work_made *made, const char *result, struct groom_diag *diag);
 /* The job has failed for good with this problem object (JSON). returns  GROOM_EINVAL, GROOM_ECONFLICT,
  *          GROOM_ECANCELLED (it was told to stop: it has only to exit) */
 GROOM_MUST_CHECK groom_status work_failed(struct jobs *jobs, const struct store_attempt_ref *ref,

@@ -5,7 +5,8 @@ static groom_status insert_preparation(struct connection *c, const char *key, co
                                        const struct store_preparation *preparation, struct groom_diag *diag)
 {
     struct query q = query_open(c, "INSERT INTO preparations (key, subject, sha256, n_bytes, used)"
-                                   " VALUES (?1, ?2, ?3, ?4, ?5) ON CONFLICT (key) DO NOTHING", diag);
+                                   " VALUES (?1, ?2, ?3, ?4, ?5) ON CONFLICT (key) DO UPDATE SET"
+                                   " sha256 = ?3, n_bytes = ?4, used = ?5", diag);
     query_text(&q, 1, key);
     query_text(&q, 2, subject);
     query_text(&q, 3, preparation->sha256);

@@ -473,7 +473,7 @@ struct store_preparation {
     char sha256[STORE_HASH_SIZE];
     uint64_t n_bytes;
 };
-/* A committed, pinned blob. One of this key that is there already stays.
+/* A committed, pinned blob. It takes the place of one of this key (whose blob is left to the collector).
  * subject  the strands or the groom that it was made of
  * returns  GROOM_ECONFLICT (fenced) */
 GROOM_MUST_CHECK groom_status store_attempt_preparation(struct store *store, const struct store_attempt_ref *ref,

@@ -16,6 +16,7 @@
 #include "server/worker/checkpoint.h"
 #include "server/worker/edit_attempt.h"
 #include "server/worker/progress_report.h"
+#include "server/worker/retarget_attempt.h"
 #include "server/worker/worker.h"
 
 static volatile sig_atomic_t stop;
@@ -47,9 +48,9 @@ static groom_status take_order(struct attempt *a)
     if (st == GROOM_OK)
         st = order_parse(response.body, response.n_body, &a->order, &a->diag);
     http_response_finish(&response);
-    if (st == GROOM_OK && strcmp(a->order.kind, "fit") && !order_is_edit(&a->order))
+    if (st == GROOM_OK && strcmp(a->order.kind, "fit") && !order_is_edit(&a->order) && !order_is_retargeting(&a->order))
         st = groom_fail_field(&a->diag, GROOM_EINVAL, "/kind",
-                              "this worker runs fits and edits in curvature space, not jobs of kind \"%.15s\"",
+                              "this worker runs fits, edits in curvature space and retargetings, not jobs of kind \"%.15s\"",
                               a->order.kind);
     return st;
 }
@@ -303,6 +304,8 @@ static groom_status run(struct attempt *a)
     groom_status st = take_order(a);
     if (st == GROOM_OK && order_is_edit(&a->order))
         return run_edit(a);
+    if (st == GROOM_OK && order_is_retargeting(&a->order))
+        return retarget_attempt(&a->link, &a->order, &a->context, &a->report, &a->diag);
     if (st == GROOM_OK)
         st = take_input(a, &a->order.strands, read_strands);
     if (st == GROOM_OK)

@@ -10,6 +10,7 @@
 #include "proto/strand_stream.h"
 #include "proto/work.h"
 #include "server/worker/clock.h"
+#include "server/worker/receive.h"
 #include "server/worker/worker.h"
 
 struct edit {
@@ -26,50 +27,10 @@ struct edit {
 
 /* --- what is needed ------------------------------------------------------------------------ */
 
-static int make_room(void *user, struct strand_stream *stream)
-{
-    struct edit *e = user;
-    if (groom_strands_create(stream->n_strands, stream->n_vertices, e->context, &e->strands, e->diag) != GROOM_OK)
-        return 0;
-    stream->first = e->strands->first;
-    stream->points = e->strands->points;
-    return 1;
-}
-
-struct reception {
-    struct strand_stream stream;
-    struct edit *edit;
-    int failed;
-};
-
-static void begin(void *user)
-{
-    struct reception *r = user;
-    groom_strands_destroy(r->edit->strands);
-    r->edit->strands = NULL;
-    r->failed = 0;
-    r->stream = (struct strand_stream){.room = make_room, .user = r->edit};
-}
-
-static size_t receive(void *user, const char *bytes, size_t n)
-{
-    struct reception *r = user;
-    r->failed = r->failed || !strand_stream_take(&r->stream, bytes, n);
-    return n; /* to the end, so that the line stays whole */
-}
-
 static groom_status take_strands(struct edit *e)
 {
-    struct reception r = {.edit = e};
-    begin(&r);
-    groom_status st = work_link_call(e->link,
-                                     &(struct http_request){.method = "GET", .path = WORK_PATH_STRANDS, .sink = receive,
-                                                            .begin = begin, .user = &r}, NULL, e->diag);
-    if (st != GROOM_OK)
-        return st;
-    if (r.failed || !strand_stream_is_whole(&r.stream))
-        return groom_fail(e->diag, GROOM_EIO, "the daemon sent %llu bytes that are no strands", (unsigned long long)r.stream.at);
-    return groom_create_of_strands(e->strands, e->context, &e->groom, e->diag);
+    groom_status st = receive_strands(e->link, e->context, &e->strands, e->diag);
+    return st == GROOM_OK ? groom_create_of_strands(e->strands, e->context, &e->groom, e->diag) : st;
 }
 
 static groom_status take_layer(struct edit *e)

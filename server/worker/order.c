@@ -54,17 +54,47 @@ static groom_status parse_input(const cJSON *object, const char *what, struct or
     return parse_blob(object, what, &input->blob, diag);
 }
 
-static groom_status parse_options(const cJSON *order_json, struct order *order, struct groom_diag *diag)
+static groom_status copy_object(const cJSON *order_json, const char *name, char **text, struct groom_diag *diag)
 {
-    const cJSON *options = member(order_json, "options");
-    order->options = cJSON_IsObject(options) ? cJSON_PrintUnformatted(options) : strdup("{}");
-    return order->options ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for the options");
+    const cJSON *object = member(order_json, name);
+    *text = cJSON_IsObject(object) ? cJSON_PrintUnformatted(object) : strdup("{}");
+    return *text ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for the order's %s", name);
 }
 
 int order_is_edit(const struct order *order)
 {
     groom_operator_type type;
     return groom_operator_parse(order->kind, &type, NULL) == GROOM_OK && groom_operator_is_layer(type);
+}
+
+int order_is_retargeting(const struct order *order) { return !strcmp(order->kind, "retarget"); }
+
+static groom_status parse_targets(const cJSON *targets, struct order *order, struct groom_diag *diag)
+{
+    const cJSON *target;
+    groom_status st = GROOM_OK;
+    cJSON_ArrayForEach(target, targets)
+    {
+        if (order->n_targets == ORDER_MOST_TARGETS)
+            return groom_fail(diag, GROOM_EFORMAT, "the daemon's order has more than %d targets", ORDER_MOST_TARGETS);
+        if ((st = parse_input(target, "target", &order->targets[order->n_targets++], diag)) != GROOM_OK)
+            return st;
+    }
+    return order->n_targets ? GROOM_OK : groom_fail(diag, GROOM_EFORMAT, "the daemon's order has no target");
+}
+
+static groom_status parse_retargeting(const cJSON *json, const cJSON *inputs, struct order *order, struct groom_diag *diag)
+{
+    const cJSON *strands = member(inputs, "strands"), *preparation = member(json, "preparation");
+    groom_status st = parse_input(member(inputs, "source"), "source", &order->source, diag);
+    if (st == GROOM_OK && strands)
+        st = parse_input(strands, "strands", &order->strands, diag);
+    if (st == GROOM_OK)
+        st = parse_targets(member(inputs, "targets"), order, diag);
+    order->keeps_preparation = preparation != NULL;
+    if (st == GROOM_OK && cJSON_IsObject(preparation))
+        st = parse_blob(preparation, "preparation", &order->preparation, diag);
+    return st == GROOM_OK ? copy_object(json, "request", &order->request, diag) : st;
 }
 
 static groom_status parse_members(const cJSON *json, struct order *order, struct groom_diag *diag)
@@ -78,13 +108,15 @@ static groom_status parse_members(const cJSON *json, struct order *order, struct
     snprintf(order->kind, sizeof order->kind, "%s", text_of(json, "kind"));
     order->attempt = (uint32_t)number_of(json, "attempt", 1);
     st = GROOM_OK;
-    if (!order_is_edit(order))
+    if (order_is_retargeting(order))
+        st = parse_retargeting(json, inputs, order, diag);
+    else if (!order_is_edit(order))
         st = parse_input(member(inputs, "strands"), "strands", &order->strands, diag);
     if (st == GROOM_OK && cJSON_IsObject(head))
         st = parse_input(head, "head", &order->head, diag);
     if (st == GROOM_OK && cJSON_IsObject(checkpoint))
         st = parse_blob(checkpoint, "checkpoint", &order->checkpoint, diag);
-    return st == GROOM_OK ? parse_options(json, order, diag) : st;
+    return st == GROOM_OK ? copy_object(json, "options", &order->options, diag) : st;
 }
 
 groom_status order_parse(const char *json, size_t n_bytes, struct order *order, struct groom_diag *diag)
@@ -101,5 +133,6 @@ groom_status order_parse(const char *json, size_t n_bytes, struct order *order, 
 void order_finish(struct order *order)
 {
     free(order->options);
+    free(order->request);
     memset(order, 0, sizeof *order);
 }

@@ -24,6 +24,8 @@ struct order_input {
     struct groom_frame frame;
 };
 
+#define ORDER_MOST_TARGETS 16
+
 struct order {
     char job[40], kind[16];
     uint32_t attempt;
@@ -31,6 +33,14 @@ struct order {
     struct order_input strands;
     struct order_input head;      /* blob.sha256 "" where there is none */
     struct order_blob checkpoint; /* sha256 "" where there is none */
+
+    /* of a retargeting */
+    char *request;                /* JSON object: skeletons, landmarks, hairlines */
+    struct order_input source;    /* the body that the hair is on */
+    struct order_input targets[ORDER_MOST_TARGETS];
+    uint32_t n_targets;
+    int keeps_preparation;        /* what is worked out of the source is handed in, or is there: */
+    struct order_blob preparation; /* sha256 "" where it is not there yet */
 };
 
 /* returns  GROOM_OK; GROOM_EFORMAT (not an order); GROOM_ENOMEM */
@@ -38,6 +48,7 @@ GROOM_MUST_CHECK groom_status order_parse(const char *json, size_t n_bytes, stru
                                           struct groom_diag *diag);
 /* Whether it is an edit in curvature space: its strands come from the daemon, evaluated. */
 int order_is_edit(const struct order *order);
+int order_is_retargeting(const struct order *order);
 void order_finish(struct order *order); /* takes zeroed values */
 
 #endif

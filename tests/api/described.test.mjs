@@ -100,6 +100,15 @@ test('every operation answers as it is described', async (t) => {
   await expect(daemon, 200, 'GET', '/v1/work/strands', { token: third });
   await expect(daemon, 202, 'DELETE', `/v1/jobs/${edit.id}`);
 
+  const carry = (await expect(daemon, 202, 'POST', '/v1/jobs', { body: { kind: 'retarget', groom: done.result.groom, dense: true,
+    source: { head: head.id }, target: { head: head.id } } })).json;
+  const fourth = await daemon.attempt();
+  await expect(daemon, 200, 'GET', '/v1/work/groom', { token: fourth });
+  await expect(daemon, 200, 'GET', '/v1/work/strands', { token: fourth });
+  await expect(daemon, 204, 'PUT', '/v1/work/preparation', { token: fourth, body: 'of the source alone' });
+  await expect(daemon, 202, 'DELETE', `/v1/jobs/${carry.id}`);
+  await get(`/v1/jobs/${carry.id}`, 200, { headers: { Prefer: 'wait=10' } }); // it needs the head until its worker is gone
+
   const other = (await expect(daemon, 201, 'POST', '/v1/grooms', { body: groom_document() })).json.groom;
   for (const path of [`grooms/${other}`, `strands/${strands.id}`, `heads/${head.id}`]) await expect(daemon, 204, 'DELETE', `/v1/${path}`);
 

@@ -758,8 +758,8 @@ START_TEST(a_preparation_is_kept_under_its_key_and_goes_with_its_subject)
     stale.number++;
     ck_status(store_preparation_get(store, "k", &found, &diag), GROOM_ENOTFOUND);
     ck_status(store_attempt_preparation(store, &stale, "k", "str_a", &made, &diag), GROOM_ECONFLICT);
-    ck_ok(store_attempt_preparation(store, &ref, "k", "str_a", &made, &diag));
-    ck_ok(store_attempt_preparation(store, &ref, "k", "str_a", &other, &diag)); /* the first stays */
+    ck_ok(store_attempt_preparation(store, &ref, "k", "str_a", &other, &diag));
+    ck_ok(store_attempt_preparation(store, &ref, "k", "str_a", &made, &diag)); /* the last stays */
     ck_ok(store_preparation_get(store, "k", &found, &diag));
     ck_assert_str_eq(found.sha256, HASH_B);
     ck_assert_uint_eq(found.n_bytes, 7);
