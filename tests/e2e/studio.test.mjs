@@ -2,37 +2,11 @@
 // taken home is what was shown.
 import test from 'node:test';
 import assert from 'node:assert/strict';
-import { spawnSync } from 'node:child_process';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { build, startDaemon, temporaryFolder } from '../support/daemon.mjs';
-import { hasBrowser, picture, startBrowser } from '../support/browser.mjs';
-
-const skip = hasBrowser ? false : 'SKIPPED: /usr/bin/chromium is not installed';
-
-function sample(t) {
-  const folder = temporaryFolder(t);
-  spawnSync(join(build, 'groomctl'), ['sample', '-o', folder, '--style', 'curly', '--strands', '400', '--vertices', '48', '--guides', '40']);
-  return folder;
-}
-
-/** The strands that the page shows, [count * vertices * 3]. */
-const shown = (page) => page.evaluate(() => Array.from(window.studio.evaluation.strands.points.slice(3, -6)));
-
-/** Waits until the page has settled on a revision. */
-const settled = (page, revision) => page.waitForFunction((r) => window.studio?.session.revision === r && !window.studio.session.busy && !window.studio.evaluation.running, revision);
-
-/** How many pixels of the canvas differ from its background by more than a little. */
-const drawn = (page) => page.evaluate(() => {
-  const source = document.querySelector('.picture canvas'), copy = document.createElement('canvas');
-  [copy.width, copy.height] = [source.width, source.height];
-  const context = copy.getContext('2d');
-  context.drawImage(source, 0, 0);
-  const { data } = context.getImageData(0, 0, copy.width, copy.height);
-  let n = 0;
-  for (let i = 0; i < data.length; i += 4) n += Math.abs(data[i] - data[0]) + Math.abs(data[i + 1] - data[1]) > 24;
-  return n / (data.length / 4);
-});
+import { build, startDaemon } from '../support/daemon.mjs';
+import { picture, startBrowser } from '../support/browser.mjs';
+import { drawn, imported, sample, settled, shown, skip } from '../support/studio.mjs';
 
 test('from files to a groom, a knob, back, and home', { skip, timeout: 300000 }, async (t) => {
   const daemon = await startDaemon(t), folder = sample(t), page = await startBrowser(t, daemon);
@@ -134,8 +108,7 @@ test('from files to a groom, a knob, back, and home', { skip, timeout: 300000 },
 
 test('ruffle and sculpt: seen under the hand, kept as layers, taken away again', { skip, timeout: 300000 }, async (t) => {
   const daemon = await startDaemon(t), folder = sample(t), page = await startBrowser(t, daemon);
-  const imported = await daemon.fetch('/v1/grooms', { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: readFileSync(join(folder, 'truth.groom.json')) });
-  await page.goto(`${daemon.url}/#/grooms/${(await imported.json()).groom}`);
+  await page.goto(`${daemon.url}/#/grooms/${await imported(daemon, folder)}`);
   await settled(page, 1);
   const before = await shown(page);
   await t.test('a ruffle is an operator like others', async () => {
@@ -175,9 +148,8 @@ test('ruffle and sculpt: seen under the hand, kept as layers, taken away again',
 
 test('pages pass an accessibility check and fit a narrow window', { skip, timeout: 120000 }, async (t) => {
   const daemon = await startDaemon(t), folder = sample(t), page = await startBrowser(t, daemon);
-  const imported = await daemon.fetch('/v1/grooms', { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: readFileSync(join(folder, 'truth.groom.json')) });
   const axe = readFileSync(new URL('../node_modules/axe-core/axe.min.js', import.meta.url), 'utf8');
-  for (const [at, ready] of [['/', '.grooms'], [`/#/grooms/${(await imported.json()).groom}`, '.chain .lil-gui']]) {
+  for (const [at, ready] of [['/', '.grooms'], [`/#/grooms/${await imported(daemon, folder)}`, '.chain .lil-gui']]) {
     await page.goto(daemon.url + at);
     await page.locator(ready).first().waitFor();
     const violations = await page.evaluate(`${axe};axe.run(document).then((r) => r.violations.map((v) => v.id + ': ' + v.nodes.map((n) => n.html).join(' ')))`);

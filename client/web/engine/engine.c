@@ -129,29 +129,28 @@ groom_status EXPORT(engine_evaluate)(const struct groom *groom, uint32_t first, 
     return groom_evaluate(groom, first, count, out, NULL, &last);
 }
 
-static int compare_indices(const void *a, const void *b)
+/* The first `count` strands of the fair order, as it stands: what comes first is a fair sample again. */
+groom_status EXPORT(engine_fair)(uint32_t n_strands, uint32_t count, uint32_t *first)
 {
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return (x > y) - (x < y);
-}
-
-/* The first `count` strands of the fair order, rising: those that the daemon exports of so many. */
-void EXPORT(engine_fair)(uint32_t n_strands, uint32_t count, uint32_t *order)
-{
+    uint32_t *order = malloc(n_strands * sizeof *order);
+    memset(&last, 0, sizeof last);
+    if (!order)
+        return groom_fail(&last, GROOM_ENOMEM, "no memory to choose %u strands", count);
     groom_fair_order(n_strands, order);
-    qsort(order, count, sizeof *order, compare_indices);
+    memcpy(first, order, count * sizeof *first);
+    free(order);
+    return GROOM_OK;
 }
 
-/* These strands alone: what a viewer shows of many. */
+/* These strands alone, in that order: what a viewer shows of many. */
 struct groom *EXPORT(engine_select)(const struct groom *groom, uint32_t count)
 {
     struct groom *selected = NULL;
-    uint32_t *order = malloc(groom->n_strands * sizeof *order);
-    memset(&last, 0, sizeof last);
-    if (!order)
-        return NULL;
-    engine_fair(groom->n_strands, count, order);
-    groom_status st = groom_select(groom, order, count, NULL, &selected, &last);
+    uint32_t *order = malloc(count * sizeof *order);
+    groom_status st = order ? engine_fair(groom->n_strands, count, order)
+                            : groom_fail(&last, GROOM_ENOMEM, "no memory to choose %u strands", count);
+    if (st == GROOM_OK)
+        st = groom_select(groom, order, count, NULL, &selected, &last);
     free(order);
     return st == GROOM_OK ? selected : NULL;
 }

@@ -81,13 +81,13 @@ export class Engine {
 
     copyIn(bytes, address) { new Uint8Array(this.memory, address, bytes.length).set(bytes); }
 
-    /* Which strands of n are shown, and exported, where `count` of them are: rising. */
+    /* Which strands of n are shown, and exported, where `count` of them are, in the fair order. */
     fair(n, count) {
-        const address = this.exports.engine_allocate(4 * n);
-        this.exports.engine_fair(n, count, address);
-        const order = new Uint32Array(this.memory, address, count).slice();
-        this.exports.engine_release(address);
-        return order;
+        const address = this.exports.engine_allocate(4 * count);
+        try {
+            this.check(this.exports.engine_fair(n, count, address));
+            return new Uint32Array(this.memory, address, count).slice();
+        } finally { this.exports.engine_release(address); }
     }
 
     /* Shadows within strands at an address: { size, origin, cell, data }, data as bytes of [cell][2]: how
@@ -136,7 +136,7 @@ export class Groom {
         return groom;
     }
 
-    /* The first strands of the fair order as a groom of their own: each evaluates as in the whole. */
+    /* The first strands of the fair order, in that order, as a groom of their own: each evaluates as in the whole. */
     select(count) {
         return new Groom(this.engine, this.engine.exports.engine_select(this.address, count), count, this.vertices);
     }

@@ -12,11 +12,11 @@ export class EngineThread {
         };
     }
 
-    call(name, given = {}) {
+    call(name, given = {}, handed = []) {
         const id = this.next++;
         return new Promise((resolve, reject) => {
             this.waiting.set(id, { resolve, reject });
-            this.worker.postMessage({ id, name, ...given });
+            this.worker.postMessage({ id, name, ...given }, handed);
         });
     }
 

@@ -3,22 +3,25 @@ import { EngineThread } from './engine_thread.mjs';
 import { by_id, element, notice, say, whole } from './dom.mjs';
 import { GuideEditor } from './guide_editor.mjs';
 import { Session } from './session.mjs';
-import { arrayOf, fetchHead, fetchStrands } from './strands.mjs';
+import { fetchHead } from './strands.mjs';
 import { exportPanel } from './panels/export.mjs';
 import { picturePanel } from './panels/picture.mjs';
 import { historyPanel } from './panels/history.mjs';
 import { operatorsPanel } from './panels/operators.mjs';
 import { sculptPanel } from './panels/sculpt.mjs';
+import { viewPanel } from './panels/view.mjs';
 import { Hair, boxOf } from './viewer/hair.mjs';
-import { COMPARISONS, VIEWS, Viewer } from './viewer/viewer.mjs';
+import { Viewer } from './viewer/viewer.mjs';
 
-const AT_FIRST = 10000, LIGHT_CELLS = 64, LIGHT_AFTER_MS = 250;
+const AT_FIRST = 10000, LIGHT_CELLS = 64, LIGHT_AFTER_MS = 250, ALL_AFTER_MS = 120, MOVING_MS = 30;
 
-/* Strands come as fast as the engine makes them; what piles up while one evaluation runs is one request. */
-class Evaluation {
+/* Strands come as fast as the engine makes them; what piles up while one evaluation runs is one request. While
+ * a knob turns, as many as keep up with the hand; all of them when it rests. */
+class Evaluation extends EventTarget {
     constructor(session, viewer) {
+        super();
         Object.assign(this, { session, viewer, running: false, again: false });
-        session.addEventListener('strands', () => this.request().catch(notice));
+        session.addEventListener('strands', ({ detail }) => this.request(detail?.moving).catch(notice));
         session.addEventListener('attempt', () => this.#attempt());
     }
 
@@ -29,19 +32,30 @@ class Evaluation {
         this.viewer.show(this.viewer.groom, this.strands);
     }
 
-    async request() {
+    #most() {
+        const { evaluated, ms } = this.strands ?? {};
+        return this.moving && ms > MOVING_MS ? (evaluated * MOVING_MS) / ms : Infinity;
+    }
+
+    async request(moving = false) {
+        this.moving = moving;
         if (this.running) { this.again = true; return; }
         this.running = true;
         try {
             do {
                 this.again = false;
-                this.strands = await this.session.strands();
+                const { strands: shown, spare } = this;
+                this.spare = undefined;
+                this.strands = await this.session.strands(this.#most(), spare);
+                this.spare = shown?.points;
                 this.viewer.show(this.viewer.groom, this.strands);
+                this.dispatchEvent(new Event('shown'));
                 say(`${whole(this.strands.count)} of ${whole(this.session.document.strands.count)} strands, ${this.strands.ms.toFixed(0)} ms`);
             } while (this.again);
         } finally { this.running = false; }
         clearTimeout(this.soon);
-        this.soon = setTimeout(() => this.light().catch(notice), this.lit ? LIGHT_AFTER_MS : 0);
+        if (this.strands.evaluated < this.strands.count) this.soon = setTimeout(() => this.request().catch(notice), ALL_AFTER_MS);
+        else this.soon = setTimeout(() => this.light().catch(notice), this.lit ? LIGHT_AFTER_MS : 0);
     }
 
     async light() {
@@ -57,42 +71,6 @@ async function shine(viewer, hair, thread, strands) {
     viewer.draw();
 }
 
-async function showTarget(viewer, { document, count: most, thread }) {
-    const id = document.source?.strands;
-    if (!id) return false;
-    const count = Math.min(document.strands.count, most);
-    const strands = await fetchStrands(id, count, Math.min(document.strands.vertices, 64));
-    viewer.show(viewer.target, strands);
-    await shine(viewer, viewer.target, thread, strands);
-    return true;
-}
-
-function showGuides(viewer, document, on) {
-    if (!on || !document.guides) { viewer.setGuides({ points: [], count: 0, vertices: 0 }); return; }
-    const operator_guides = new Set(arrayOf(document.operator_guides.guide));
-    viewer.setGuides({ ...document.guides, points: arrayOf(document.guides.points) }, operator_guides);
-}
-
-function viewPanel(parent, session, viewer, editor) {
-    const looks = Object.keys(VIEWS).map((name, i) => element('button', { type: 'button', onclick: () => viewer.look(name), title: `Key ${i + 1}` }, name));
-    const compare = element('select', { onchange: () => { viewer.comparison = compare.value; wipe.hidden = compare.value !== 'wipe'; viewer.draw(); } },
-        COMPARISONS.map((name) => element('option', {}, name)));
-    const wipe = element('input', { type: 'range', min: 0, max: 1, step: 0.01, value: 0.5, hidden: true, 'aria-label': 'Where the wipe stands',
-        oninput: () => { viewer.wipe = Number(wipe.value); viewer.draw(); } });
-    const density = element('input', { type: 'range', min: 100, max: session.document.strands.count, value: session.count,
-        onchange: () => session.choose(Number(density.value)).catch(notice) });
-    const guides = element('input', { type: 'checkbox', onchange: () => {
-        showGuides(viewer, session.document, guides.checked);
-        editor.enable(guides.checked);
-    } });
-    const comparing = element('label', { hidden: true }, 'compare', compare);
-    session.addEventListener('document', () => guides.checked && showGuides(viewer, session.document, true));
-    parent.append(element('section', { class: 'panel' }, element('h2', {}, 'View'),
-        element('div', { class: 'row' }, looks), comparing, wipe, element('label', {}, 'density', density),
-        element('label', {}, guides, 'guides: click one, drag its points; operator guides in orange')));
-    return comparing;
-}
-
 /* strands: how many to show at first (#/grooms/ID?strands=N) */
 export async function groomPage(main, id, strands = AT_FIRST) {
     const thread = new EngineThread(), session = new Session(id, thread);
@@ -102,7 +80,8 @@ export async function groomPage(main, id, strands = AT_FIRST) {
     main.replaceChildren(element('div', { class: 'studio' }, picture, work));
     by_id('trail').replaceChildren(element('a', { href: `#/grooms/${id}` }, session.document.name || id));
     const viewer = new Viewer(picture), evaluation = new Evaluation(session, viewer);
-    const editor = new GuideEditor(viewer, session), comparing = viewPanel(work, session, viewer, editor), chain = element('div', { class: 'chain' });
+    const editor = new GuideEditor(viewer, session), chain = element('div', { class: 'chain' });
+    const view = viewPanel(work, { session, viewer, evaluation, editor, shine: (hair, own) => shine(viewer, hair, thread, own) });
     work.append(chain);
     operatorsPanel(chain, session, types);
     const armature = sculptPanel(work, session, viewer);
@@ -114,7 +93,7 @@ export async function groomPage(main, id, strands = AT_FIRST) {
     viewer.look('front');
     const { head } = session.document.source ?? {};
     if (head) fetchHead(head).then((geometry) => viewer.setHead(geometry)).catch(notice);
-    showTarget(viewer, session).then((shown) => { comparing.hidden = !shown; }).catch(notice);
-    window.studio = { viewer, session, evaluation, editor, armature }; /* for those who look inside, tests among them */
+    view.reload().catch(notice);
+    window.studio = { viewer, session, evaluation, editor, armature, view }; /* for those who look inside, tests among them */
     return () => { viewer.dispose(); thread.close(); };
 }

@@ -2,6 +2,8 @@
 import '../node_modules/lil-gui/dist/lil-gui.css';
 import 'uplot/dist/uPlot.min.css';
 import './studio.css';
+import { guardLinks } from './access.mjs';
+import { file } from './api.mjs';
 import { by_id, element, notice } from './dom.mjs';
 import { groomPage } from './groom_page.mjs';
 import { jobPage } from './job_page.mjs';
@@ -29,4 +31,5 @@ async function show() {
 
 window.addEventListener('hashchange', show);
 document.body.append(commandsPanel());
+guardLinks(file, notice);
 show();

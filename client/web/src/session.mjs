@@ -32,35 +32,41 @@ export class Session extends EventTarget {
 
     async #load() {
         if (!this.remote) await this.thread.call('open', { document: this.document, count: this.count });
+        await this.#arrange();
     }
 
-    /* What is to be seen: { points, count, vertices, ms }. */
-    async strands() {
-        if (!this.remote) return this.thread.call('evaluate');
-        const from = performance.now(), strands = await fetchGroomStrands(this.at, this.revision, this.count);
-        return { ...strands, ms: performance.now() - from };
+    /* Strands are shown in a fair order: `order` says which strand stands in a slot, `slotOf` in which slot the
+     * i-th of them in rising order stands, as the daemon sends them. */
+    async #arrange() {
+        const n = this.document.strands.count;
+        if (this.order?.length === this.count && this.arranged === n) return;
+        this.order = await this.thread.call('fair', { n, count: this.count });
+        this.arranged = n;
+        this.slots = new Map(Array.from(this.order, (strand, slot) => [strand, slot]));
+        this.slotOf = Uint32Array.from(this.order.slice().sort(), (strand) => this.slots.get(strand));
     }
+
+    /* What is to be seen: { points, count, vertices, evaluated, ms }; of the engine's, the first `most` alone.
+     * spare: points of an earlier answer that nobody looks at any more. */
+    async strands(most, spare) {
+        if (!this.remote) return this.thread.call('evaluate', { most, spare }, spare ? [spare.buffer] : []);
+        const from = performance.now(), strands = await fetchGroomStrands(this.at, this.revision, this.count, this.slotOf);
+        return { ...strands, evaluated: strands.count, ms: performance.now() - from };
+    }
+
+    /* The same of another revision, as the daemon has it. */
+    strandsOf(revision) { return fetchGroomStrands(this.at, revision, this.count, this.slotOf); }
 
     /* --- layers under the hand --- */
 
     /* An attempt's strands in place of those that are shown: `points` as the daemon answers. */
     async tryOn(points) {
-        const vertices = this.document.strands.vertices, made = arrayOf(points.points), slots = await this.#slots();
+        const vertices = this.document.strands.vertices, made = arrayOf(points.points);
         this.attempt = arrayOf(points.strand).reduce((found, strand, i) => {
-            if (slots.has(strand)) found.push({ slot: slots.get(strand), points: made.subarray(3 * i * vertices, 3 * (i + 1) * vertices) });
+            if (this.slots.has(strand)) found.push({ slot: this.slots.get(strand), points: made.subarray(3 * i * vertices, 3 * (i + 1) * vertices) });
             return found;
         }, []);
         this.#tell('attempt');
-    }
-
-    /* Where each strand that is shown stands. */
-    async #slots() {
-        const n = this.document.strands.count;
-        if (this.slots?.count !== this.count) {
-            const order = await this.thread.call('fair', { n, count: this.count });
-            this.slots = { count: this.count, map: new Map(Array.from(order, (strand, slot) => [strand, slot])) };
-        }
-        return this.slots.map;
     }
 
     /* A layer's knob while it turns: tried where it is the last of the chain and the daemon answers at once. */
@@ -95,7 +101,16 @@ export class Session extends EventTarget {
         this.shown ??= document.revision;
     }
 
-    #tell(what) { this.dispatchEvent(new CustomEvent(what)); }
+    #tell(what, detail) { this.dispatchEvent(new CustomEvent(what, { detail })); }
+
+    /* Another revision stands beside this one in the picture; null: the target again. */
+    compareWith(revision) { this.#tell('against', { revision }); }
+
+    /* An operator as the fit, or whoever made the groom, left it; undefined where it came later. */
+    async original(id) {
+        this.first ??= get(`${this.at}?revision=1&arrays=false`);
+        return (await this.first).operators.find((operator) => operator.id === id);
+    }
 
     /* While the knob turns: the page alone. */
     async turn(index, parameter, value) {
@@ -103,7 +118,7 @@ export class Session extends EventTarget {
         if (LAYERS.includes(this.operators[index].type)) return this.#tryLayer(index);
         if (this.remote) return undefined; /* seen when the knob rests */
         await this.thread.call('set', { index, type: this.operators[index].type, parameter, value });
-        return this.#tell('strands');
+        return this.#tell('strands', { moving: true });
     }
 
     /* The knob rests: a revision. Edits go out one after another, each on the revision of the one before. */
@@ -115,7 +130,7 @@ export class Session extends EventTarget {
     async moveGuide(guide, points) {
         if (this.remote) return undefined;
         await this.thread.call('moveGuide', { guide, points });
-        return this.#tell('strands');
+        return this.#tell('strands', { moving: true });
     }
 
     putGuides(file) {
@@ -159,6 +174,8 @@ export class Session extends EventTarget {
     async choose(count) {
         this.count = count;
         if (!this.remote) await this.thread.call('choose', { count });
+        await this.#arrange();
+        this.#tell('chosen');
         this.#tell('strands');
     }
 

@@ -4,22 +4,32 @@ import { OBJLoader } from 'three/addons/loaders/OBJLoader.js';
 import { PLYLoader } from 'three/addons/loaders/PLYLoader.js';
 import { bytes, get } from './api.mjs';
 
-/* USC .data of strands of one vertex count -> { points, count, vertices } with a Hair's room at the ends. */
-function parse(buffer) {
-    const view = new DataView(buffer), count = view.getInt32(0, true), vertices = view.getInt32(4, true);
-    const points = new Float32Array(3 + 3 * count * vertices + 6), stride = 4 + 12 * vertices;
-    for (let s = 0; s < count; s++)
-        points.set(new Float32Array(buffer.slice(8 + s * stride, 4 + (s + 1) * stride)), 3 + 3 * s * vertices);
+/* USC .data -> { points, count, vertices } with a Hair's room at the ends. Strand i of the file stands at
+ * slotOf[i] where that is given; what has fewer vertices than the longest rests at its tip. */
+function parse(buffer, slotOf) {
+    const view = new DataView(buffer), count = view.getInt32(0, true), begins = new Uint32Array(count + 1);
+    let vertices = 2;
+    for (let s = 0, at = 4; s < count; s++) {
+        begins[s] = at + 4;
+        vertices = Math.max(vertices, view.getInt32(at, true));
+        at = begins[s + 1] = begins[s] + 12 * view.getInt32(at, true);
+    }
+    const points = new Float32Array(3 + 3 * count * vertices + 6);
+    for (let s = 0; s < count; s++) {
+        const own = new Float32Array(buffer, begins[s], 3 * view.getInt32(begins[s] - 4, true)), to = 3 + 3 * (slotOf ? slotOf[s] : s) * vertices;
+        points.set(own, to);
+        for (let i = own.length; i < 3 * vertices; i++) points[to + i] = own[own.length - 3 + (i % 3)];
+    }
     return { points, count, vertices };
 }
 
 /* A groom's strands as the daemon evaluates them. */
-export const fetchGroomStrands = async (at, revision, count) =>
-    parse(await bytes(`${at}/strands?format=data&revision=${revision}&count=${count}`));
+export const fetchGroomStrands = async (at, revision, count, slotOf) =>
+    parse(await bytes(`${at}/strands?format=data&revision=${revision}&count=${count}`), slotOf);
 
 /* So many of an upload's strands, evenly resampled. */
-export const fetchStrands = async (id, count, vertices) =>
-    parse(await bytes(`/v1/strands/${id}/data?format=data&count=${count}&vertices=${vertices}`));
+export const fetchStrands = async (id, count, vertices, slotOf) =>
+    parse(await bytes(`/v1/strands/${id}/data?format=data&count=${count}&vertices=${vertices}`), slotOf);
 
 /* (x, y, z) with z up is (x, z, -y) here. */
 function intoMetres(positions, unit_m, up) {

@@ -7,18 +7,18 @@ let whole = null, shown = null;
 
 function choose(count) {
     const n = Math.max(1, Math.min(count, whole.count));
-    if (shown && shown !== whole) shown.destroy();
-    shown = n === whole.count ? whole : whole.select(n);
+    shown?.destroy();
+    shown = whole.select(n); /* in the fair order, all of them, too */
 }
 
-const both = (work) => { work(whole); if (shown !== whole) work(shown); };
+const both = (work) => { work(whole); work(shown); };
 
 const calls = {
     async about() { return { types: (await engine).types }; },
     async fair({ n, count }) { return (await engine).fair(n, count); },
     async open({ document, count }) {
         const loaded = await engine;
-        if (shown && shown !== whole) shown.destroy();
+        shown?.destroy();
         whole?.destroy();
         whole = shown = null;
         whole = Groom.fromDocument(loaded, document);
@@ -32,12 +32,15 @@ const calls = {
     },
     moveGuide: ({ guide, points }) => both((groom) => groom.moveGuide(guide, points)),
     enable: ({ index, operator }) => both((groom) => groom.enable(index, operator)),
-    evaluate() {
-        const from = performance.now(), points = shown.evaluate();
-        const value = { count: shown.count, vertices: shown.vertices, ms: performance.now() - from };
-        /* one vertex of room before and two behind, for the ends of the ribbons */
-        value.points = new Float32Array(points.length + 9);
-        value.points.set(points, 3);
+    /* The first `most` of the strands that are shown. `spare` comes back with new points where it fits: pages
+     * that are fresh from the system cost as much as the strands on them. */
+    evaluate({ most = Infinity, spare }) {
+        const evaluated = Math.max(1, Math.min(shown.count, Math.floor(most)));
+        const from = performance.now(), made = shown.evaluate(0, evaluated);
+        const value = { count: shown.count, vertices: shown.vertices, evaluated, ms: performance.now() - from };
+        const n = 3 * shown.count * shown.vertices + 9; /* one vertex of room before and two behind, for the ends of the ribbons */
+        value.points = spare?.length === n ? spare : new Float32Array(n);
+        value.points.set(made, 3);
         return value;
     },
     light: async ({ strands, ...options }) => (strands

@@ -1,4 +1,5 @@
 /* What was done here, as lines for a shell: docked at the foot of every page. */
+import { token } from '../access.mjs';
 import { commandsOf, told } from '../commands.mjs';
 import { element } from '../dom.mjs';
 
@@ -21,7 +22,7 @@ export function lines() {
     return {
         rows: [ctl.row, curl.row],
         say(call) {
-            const made = commandsOf(call, { origin: location.origin });
+            const made = commandsOf(call, { origin: location.origin, withToken: Boolean(token()) });
             [ctl.text.textContent, curl.text.textContent] = [made?.groomctl ?? '', made?.curl ?? ''];
         },
     };
@@ -32,7 +33,7 @@ export function commandsPanel() {
     const panel = element('details', { class: 'commands' }, head,
         element('p', {}, 'What you do here is listed as lines for a shell, the last first. They take the daemon’s own words and run as they stand.'), list);
     told.addEventListener('call', ({ detail }) => {
-        const made = commandsOf(detail, { origin: location.origin });
+        const made = commandsOf(detail, { origin: location.origin, withToken: Boolean(token()) });
         if (!made) return;
         const both = lines();
         both.say(detail);

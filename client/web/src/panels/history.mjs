@@ -14,7 +14,8 @@ export function historyPanel(parent, session) {
         redo.disabled = session.undone.length === 0;
         list.replaceChildren(...revisions.map((r) => element('li', { value: r.revision },
             action(`${r.note || 'edit'}${r.name ? ` – ${r.name}` : ''}`, () => session.revert(r.revision).then(() => { session.shown = r.revision; }),
-                { class: 'plain', disabled: r.revision === session.revision, title: 'Go back to this version' }), ` ${ago(r.created_at)}`)));
+                { class: 'plain', disabled: r.revision === session.revision, title: 'Go back to this version' }), ` ${ago(r.created_at)} `,
+            r.revision !== session.revision && element('button', { type: 'button', class: 'small', onclick: () => session.compareWith(r.revision), 'aria-label': `Revision ${r.revision} beside it` }, 'beside'))));
     };
     session.addEventListener('revision', () => refresh().catch(() => {}));
     by_id('main').addEventListener('keydown', (event) => {

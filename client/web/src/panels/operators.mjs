@@ -24,6 +24,16 @@ function parameterSlider(folder, session, index, parameter) {
     });
 }
 
+/* Its parameters as they were in the first revision; as a new one has them where it came later. */
+async function reset(session, operator, type, at) {
+    const first = await session.original(operator.id), changes = [];
+    for (const { name, initial } of type.parameters) {
+        const value = first?.[name] ?? initial;
+        if (Math.abs((operator[name] ?? initial) - value) > 1e-7 * Math.abs(value)) changes.push({ op: 'add', path: `${at}/${name}`, value });
+    }
+    if (changes.length) await session.patch(changes);
+}
+
 function operatorFolder(gui, session, types, index) {
     const operator = session.operators[index], type = types.find((t) => t.name === operator.type);
     const folder = gui.addFolder(`${index + 1}  ${operator.type}`), patch = (operations) => session.patch(operations).catch(notice);
@@ -32,6 +42,7 @@ function operatorFolder(gui, session, types, index) {
     const on = operator.enabled !== false;
     const actions = {
         [on ? 'switch off' : 'switch on']: () => patch([{ op: 'add', path: `${at}/enabled`, value: !on }]),
+        'reset': () => reset(session, operator, type, at).catch(notice),
         'new seed': () => patch([{ op: 'add', path: `${at}/seed`, value: (operator.seed ?? 1) + 1 }]),
         'earlier': () => index > 0 && patch([{ op: 'move', from: at, path: `/operators/${index - 1}` }]),
         'later': () => index + 1 < session.operators.length && patch([{ op: 'move', from: at, path: `/operators/${index + 1}` }]),

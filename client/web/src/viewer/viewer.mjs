@@ -1,11 +1,20 @@
 /* The picture: head, groom, target and guides under one camera. Draws when something has changed. */
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { Detail } from './detail.mjs';
 import { Hair } from './hair.mjs';
 
 const FIELD_OF_VIEW = 20, MARGIN = 1.12;
 export const VIEWS = { front: [0, 0, 1], side: [1, 0, 0], back: [0, 0, -1], top: [0, 1, 0.001] };
 export const COMPARISONS = ['groom', 'target', 'side by side', 'overlay', 'wipe'];
+
+/* Lines of a pinhole camera's pyramid, [..][3]: p = R x + t in its own axes (x right, y down, z forward). */
+function frustumOf({ width, height, fx, fy, cx, cy, rotation, translation }, depth) {
+    const toWorld = (p) => [0, 1, 2].map((c) => rotation.reduce((sum, row, k) => sum + row[c] * (p[k] - translation[k]), 0));
+    const eye = toWorld([0, 0, 0]);
+    const corners = [[0, 0], [width, 0], [width, height], [0, height]].map(([u, v]) => toWorld([((u - cx) / fx) * depth, ((v - cy) / fy) * depth, depth]));
+    return corners.flatMap((corner, i) => [...eye, ...corner, ...corner, ...corners[(i + 1) % 4]]);
+}
 
 export class Viewer {
     constructor(parent) {
@@ -18,12 +27,15 @@ export class Viewer {
         this.scene = new THREE.Scene();
         this.camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
         this.controls = new OrbitControls(this.camera, this.canvas);
-        this.controls.addEventListener('change', () => this.draw());
+        this.detail = new Detail(() => this.draw());
+        this.controls.addEventListener('start', () => this.detail.move());
+        this.controls.addEventListener('change', () => { if (this.controls.state !== -1) this.detail.move(); this.draw(); });
         this.box = new THREE.Box3(new THREE.Vector3(-0.1, 1.5, -0.1), new THREE.Vector3(0.1, 1.8, 0.1));
         this.groom = this.#hair();
         this.target = this.#hair([0.24, 0.17, 0.11]);
         this.guides = new THREE.Group();
-        this.scene.add(this.guides, new THREE.HemisphereLight(0xdfe6f2, 0x60534a, 2.2));
+        this.cameras = new THREE.Group();
+        this.scene.add(this.guides, this.cameras, new THREE.HemisphereLight(0xdfe6f2, 0x60534a, 2.2));
         this.comparison = 'groom';
         this.wipe = 0.5;
         this.background = new THREE.Color(0x23262b);
@@ -45,20 +57,12 @@ export class Viewer {
 
     /* --- what is shown ------------------------------------------------------ */
 
-    frame(box) {
-        this.box = box;
-        for (const hair of [this.groom, this.target]) this.#fit(hair);
-    }
-
-    #fit(hair) {
-        if (hair.count) hair.material.uniforms.width.value = Hair.widthOf(this.diagonal, hair.count);
-    }
+    frame(box) { this.box = box; }
 
     get diagonal() { return this.box.getSize(new THREE.Vector3()).length(); }
 
     show(hair, strands) {
         hair.show(strands);
-        this.#fit(hair);
         this.draw();
     }
 
@@ -80,6 +84,17 @@ export class Viewer {
                     for (let k = 0; k < 6; k++) ends.push(points[3 * (g * vertices + j) + k]);
             const geometry = new THREE.BufferGeometry().setAttribute('position', new THREE.Float32BufferAttribute(ends, 3));
             this.guides.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color, transparent: true, opacity: 0.85 })));
+        }
+        this.draw();
+    }
+
+    /* Cameras of a capture (groom/camera.h) as frusta of `depth` metres. */
+    setCameras(cameras, depth = 0.12) {
+        this.cameras.clear();
+        const ends = cameras.flatMap((camera) => frustumOf(camera, depth));
+        if (ends.length) {
+            const geometry = new THREE.BufferGeometry().setAttribute('position', new THREE.Float32BufferAttribute(ends, 3));
+            this.cameras.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: 0x9be28c })));
         }
         this.draw();
     }
@@ -117,8 +132,9 @@ export class Viewer {
 
     draw() {
         if (this.waiting) return;
-        this.waiting = requestAnimationFrame(() => {
+        this.waiting = requestAnimationFrame((now) => {
             this.waiting = 0;
+            this.most = this.detail.frame(Math.max(this.groom.count, this.target.count), now);
             this.#render();
         });
     }
@@ -134,6 +150,8 @@ export class Viewer {
         for (const [hair, on] of [[this.groom, groom], [this.target, target]]) {
             const { uniforms } = hair.material;
             hair.visible = on && hair.count > 0;
+            if (!hair.visible) continue;
+            hair.draw(this.most, this.diagonal);
             uniforms.pixel.value = 2 * Math.tan((FIELD_OF_VIEW * Math.PI) / 360) / (size.y * this.renderer.getPixelRatio());
             uniforms.keyDirection.value.copy(Viewer.KEY);
             uniforms.rimDirection.value.copy(Viewer.RIM);
@@ -172,6 +190,7 @@ export class Viewer {
     dispose() {
         cancelAnimationFrame(this.waiting);
         this.observer.disconnect();
+        this.detail.stop();
         this.controls.dispose();
         this.groom.dispose();
         this.target.dispose();
