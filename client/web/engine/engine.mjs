@@ -6,7 +6,9 @@ const ARRAYS = [
     ['instancing', 'guide'], ['instancing', 'weight'], ['operator_guides', 'guide'], ['operator_guides', 'of_strand'],
 ];
 
-function bytesOf(array) {
+/* Of an array of a document: { dtype, shape, data }. */
+export function bytesOf(array) {
+    if (Uint8Array.fromBase64) return Uint8Array.fromBase64(array.data);
     const text = atob(array.data);
     const bytes = new Uint8Array(text.length);
     for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);

@@ -39,6 +39,7 @@ class Evaluation extends EventTarget {
 
     async request(moving = false) {
         this.moving = moving;
+        if (moving) this.viewer.detail.move();
         if (this.running) { this.again = true; return; }
         this.running = true;
         try {

@@ -2,6 +2,7 @@
 import { BufferGeometry, Float32BufferAttribute } from 'three';
 import { OBJLoader } from 'three/addons/loaders/OBJLoader.js';
 import { PLYLoader } from 'three/addons/loaders/PLYLoader.js';
+import { bytesOf } from '../engine/engine.mjs';
 import { bytes, get } from './api.mjs';
 
 /* USC .data -> { points, count, vertices } with a Hair's room at the ends. Strand i of the file stands at
@@ -58,8 +59,7 @@ export async function fetchHead(id) {
 }
 
 /* An array of a document: { dtype, shape, data }. */
-export function arrayOf({ dtype, data }) {
-    const text = atob(data), raw = new Uint8Array(text.length);
-    for (let i = 0; i < text.length; i++) raw[i] = text.charCodeAt(i);
-    return dtype === 'u32' ? new Uint32Array(raw.buffer) : new Float32Array(raw.buffer);
+export function arrayOf(array) {
+    const { buffer } = bytesOf(array);
+    return array.dtype === 'u32' ? new Uint32Array(buffer) : new Float32Array(buffer);
 }

@@ -27,7 +27,7 @@ export class Viewer {
         this.scene = new THREE.Scene();
         this.camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
         this.controls = new OrbitControls(this.camera, this.canvas);
-        this.detail = new Detail(() => this.draw());
+        this.detail = new Detail(this.renderer.getContext(), () => this.draw());
         this.controls.addEventListener('start', () => this.detail.move());
         this.controls.addEventListener('change', () => { if (this.controls.state !== -1) this.detail.move(); this.draw(); });
         this.box = new THREE.Box3(new THREE.Vector3(-0.1, 1.5, -0.1), new THREE.Vector3(0.1, 1.8, 0.1));
@@ -132,10 +132,14 @@ export class Viewer {
 
     draw() {
         if (this.waiting) return;
-        this.waiting = requestAnimationFrame((now) => {
+        if (this.detail.busy) { this.detail.again = true; return; }
+        this.waiting = requestAnimationFrame(() => {
             this.waiting = 0;
-            this.most = this.detail.frame(Math.max(this.groom.count, this.target.count), now);
+            const each = Math.max(this.groom.vertices ?? 0, 2), segments = Math.max(this.groom.evaluated ?? 0, this.target.evaluated ?? 0) * each;
+            const taken = this.detail.take(segments);
+            this.most = Math.max(1, Math.round(taken / each));
             this.#render();
+            this.detail.submitted(taken);
         });
     }
 
