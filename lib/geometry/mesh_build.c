@@ -154,7 +154,9 @@ static int keep_triangle(struct cutter *cutter, const uint32_t cut[3])
 {
     const float(*points)[3] = cutter->build->points.items;
     const uint32_t *v = cutter->corner_vertex;
-    if (!has_area(points[v[cut[0]]], points[v[cut[1]]], points[v[cut[2]]]))
+    if (v[cut[0]] == v[cut[2]])
+        return 0;
+    if (!cutter->build->by_faces_alone && !has_area(points[v[cut[0]]], points[v[cut[1]]], points[v[cut[2]]]))
         return 0;
     uint32_t *triangle = growing_add(&cutter->triangles, 1, cutter->build->allocator);
     uint32_t *uv_triangle = growing_add(&cutter->uv_triangles, 1, cutter->build->allocator);
@@ -168,6 +170,15 @@ static int keep_triangle(struct cutter *cutter, const uint32_t cut[3])
     return 1;
 }
 
+static void fan(uint32_t n, uint32_t (*cut)[3])
+{
+    for (uint32_t i = 0; i + 2 < n; i++) {
+        cut[i][0] = 0;
+        cut[i][1] = i + 1;
+        cut[i][2] = i + 2;
+    }
+}
+
 static groom_status cut_face(struct cutter *cutter, const struct mesh_face *face, struct groom_diag *diag)
 {
     uint32_t n = 0, n_kept = 0;
@@ -175,7 +186,9 @@ static groom_status cut_face(struct cutter *cutter, const struct mesh_face *face
         cutter->report->n_dropped_not_finite++;
         return GROOM_OK;
     }
-    if (n >= 3)
+    if (cutter->build->by_faces_alone)
+        fan(n, cutter->cut);
+    else if (n >= 3)
         polygon_triangulate((const float(*)[3])cutter->build->points.items, cutter->corner_vertex, n,
                             &cutter->scratch, cutter->cut);
     for (uint32_t i = 0; i + 2 < n; i++) {

@@ -25,6 +25,7 @@ struct mesh_build {
     struct growing uvs;     /* float[2]; may be not finite */
     struct growing corners; /* struct mesh_corner, indices unchecked */
     struct growing faces;   /* struct mesh_face */
+    int by_faces_alone;     /* groom_mesh_read_options */
 };
 
 void mesh_build_init(struct mesh_build *build, const struct groom_context *context);

@@ -59,6 +59,7 @@ groom_status groom_mesh_read(const struct groom_source *source, const struct gro
     /* offsets are kept in 32 bits */
     size_t max_bytes = options->max_bytes && options->max_bytes < UINT32_MAX ? options->max_bytes : UINT32_MAX - 1u;
     mesh_build_init(&build, context);
+    build.by_faces_alone = options->by_faces_alone;
     if ((st = growing_read_all(&bytes, source, max_bytes, allocator, diag)) != GROOM_OK)
         goto out;
     report->format = options->format;

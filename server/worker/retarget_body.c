@@ -22,7 +22,7 @@ static groom_status complain(groom_status st, const char *place, struct groom_di
 static groom_status read_mesh(struct work_link *link, const struct order_input *input, const struct groom_context *context,
                               struct groom_mesh **mesh, struct groom_diag *diag)
 {
-    struct groom_mesh_read_options options = {.frame = input->frame};
+    struct groom_mesh_read_options options = {.frame = input->frame, .by_faces_alone = 1};
     struct groom_memory_source memory;
     struct blob blob;
     groom_status st = blob_fetch(link, &input->blob, &blob, diag);

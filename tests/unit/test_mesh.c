@@ -98,6 +98,28 @@ START_TEST(a_star_of_a_thousand_corners_keeps_its_area)
 }
 END_TEST
 
+/* The shorter diagonal of the first is the longer one of the second, and a triangle of it has no area. */
+START_TEST(the_same_faces_can_be_cut_alike_wherever_their_corners_are)
+{
+    static const char *const files[] = {"v 0 0 0\nv 3 0 0\nv 4 1 0\nv 1 1 0\nv 5 0 0\nf 1 2 3 4\nf 2 5 3\n",
+                                        "v 1 0 0\nv 4 0 0\nv 3 1 0\nv 0 1 0\nv 5 -1 0\nf 1 2 3 4\nf 2 5 3\n"};
+    const struct groom_mesh_read_options alike = {.by_faces_alone = 1};
+    struct groom_mesh *mesh[2], *other[2];
+    for (int i = 0; i < 2; i++) {
+        other[i] = mesh_of(files[i]);
+        ck_ok(read_text(files[i], strlen(files[i]), &alike, &mesh[i], NULL, NULL));
+        ck_assert_uint_eq(mesh[i]->n_triangles, 3);
+    }
+    ck_assert_int_ne(memcmp(other[0]->triangles, other[1]->triangles, 2 * sizeof *other[0]->triangles), 0);
+    ck_assert_uint_eq(other[1]->n_triangles, 2);
+    ck_assert_mem_eq(mesh[0]->triangles, mesh[1]->triangles, 3 * sizeof *mesh[0]->triangles);
+    for (int i = 0; i < 2; i++) {
+        groom_mesh_destroy(mesh[i]);
+        groom_mesh_destroy(other[i]);
+    }
+}
+END_TEST
+
 START_TEST(unusable_faces_are_dropped_and_counted)
 {
     const char *text = SQUARE "v nan 0 0\nv 2 0 0\nv 7 7 7\nf 1 2 3\nf 1 2 5\nf 1 2 6\nf 1 1 2\n";
@@ -343,7 +365,8 @@ END_TEST
 
 TEST_SUITE("mesh", obj_reads_points_faces_and_texture_coordinates,
            obj_reads_negative_indices_joined_lines_and_carriage_returns, concave_polygons_keep_their_area,
-           a_star_of_a_thousand_corners_keeps_its_area, unusable_faces_are_dropped_and_counted,
+           a_star_of_a_thousand_corners_keeps_its_area,
+           the_same_faces_can_be_cut_alike_wherever_their_corners_are, unusable_faces_are_dropped_and_counted,
            texture_coordinates_that_some_faces_lack_are_dropped_with_a_warning, units_and_axes_become_metres_y_up,
            a_group_is_kept_alone, ply_reads_ascii_and_both_byte_orders, ply_reads_texture_coordinates_of_corners,
            every_truncation_is_refused_or_leaves_a_valid_mesh, bad_files_are_refused_by_name_and_offset,

@@ -60,6 +60,8 @@ struct groom_mesh_read_options {
     struct groom_frame frame; /* {0}: metres, y up */
     const char *group;        /* OBJ: keep only faces of the group or object of this name; NULL: all */
     uint64_t max_bytes;       /* refuse a longer file with GROOM_ETOOBIG; 0: 2^32-1 */
+    int by_faces_alone;       /* 1: polygons are fanned from their first corner and kept without area, so that two
+                               * files with the same faces have the same triangles, wherever their corners are */
 };
 
 struct groom_mesh_read_report {
