@@ -31,21 +31,18 @@ static void print_properties(const cJSON *schema, const char *prefix)
     }
 }
 
-/* The schema of a fit's options, wherever the answer keeps it. */
-static const cJSON *fit_schema(const cJSON *answer)
-{
-    const cJSON *fit = cJSON_GetObjectItemCaseSensitive(answer, "fit");
-    return fit ? fit : answer;
-}
-
 int command_options(struct groomctl *ctl, const struct arguments *arguments)
 {
+    const char *kind = argument(arguments, "kind") ? argument(arguments, "kind") : "fit";
     cJSON *answer = NULL;
     int status = api_json(ctl, "GET", "/v1/options", NULL, NULL, &answer);
+    const cJSON *schema = cJSON_GetObjectItemCaseSensitive(answer, kind);
     if (status == DONE && ctl->json)
         api_print(ctl, answer);
+    else if (status == DONE && schema)
+        print_properties(schema, "");
     else if (status == DONE)
-        print_properties(fit_schema(answer), "");
+        status = groomctl_usage_error("options", "--kind %s is no kind of job that has options of its own", kind);
     cJSON_Delete(answer);
     return status;
 }

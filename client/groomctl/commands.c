@@ -22,6 +22,20 @@ const struct option_spec groomctl_global_options[] = {
 
 static const struct option_spec upload_options[] = {READ_OPTIONS, {0}};
 
+#define JOB_OPTIONS                                                                                    \
+    {"option", 0, "PATH=VALUE", "any other option: stages.initialize.n_smooth=40 (see: groomctl options)"}, \
+    {"options", 0, "FILE", "options as a JSON object; the ones above come on top"},                     \
+    {"priority", 0, "N", "larger ones go first, -100 to 100 (0)"},                                      \
+    {"webhook", 0, "URL", "who is told of the job's end; needs --webhook-secret"},                      \
+    {"webhook-secret", 0, "TEXT", "of the message's signature, 16 characters or more"},                 \
+    {"wait", 'w', NULL, "follow the job to its end"},                                                   \
+    {"output", 'o', "FILE", "wait, then export the strands there, in the unit and axis of the upload"}, \
+    {"groom-id-file", 0, "FILE", "wait, then write the groom's id there, for scripts"},                 \
+    {"output-format", 0, "F", "of that file, where its extension does not tell"},                       \
+    {"head-unit", 0, "U", "of the head's file, where it is not the strands'"},                          \
+    {"head-up", 0, "A", "of the head's file, where it is not the strands'"},                            \
+    READ_OPTIONS
+
 static const struct option_spec fit_options[] = {
     {"head", 0, "HEAD", "id of an uploaded head, or a file of one"},
     {"head-file", 0, "FILE", "upload this head first"},
@@ -32,20 +46,25 @@ static const struct option_spec fit_options[] = {
     {"quality", 0, "Q", "draft, standard or high"},
     {"seed", 0, "N", "of all random numbers (1)"},
     {"cameras", 0, "FILE", "cameras of the capture, for visibility: cameras.json, transforms.json, or COLMAP's folder of text"},
-    {"option", 0, "PATH=VALUE", "any other option: stages.initialize.n_smooth=40 (see: groomctl options)"},
-    {"options", 0, "FILE", "options as a JSON object; the ones above come on top"},
-    {"priority", 0, "N", "larger ones go first, -100 to 100 (0)"},
-    {"webhook", 0, "URL", "who is told of the job's end; needs --webhook-secret"},
-    {"webhook-secret", 0, "TEXT", "of the message's signature, 16 characters or more"},
-    {"wait", 'w', NULL, "follow the job to its end"},
-    {"output", 'o', "FILE", "wait, then export the strands there, in the unit and axis of the upload"},
-    {"groom-id-file", 0, "FILE", "wait, then write the groom's id there, for scripts"},
-    {"output-format", 0, "F", "of that file, where its extension does not tell"},
-    {"head-unit", 0, "U", "of the head's file, where it is not the strands'"},
-    {"head-up", 0, "A", "of the head's file, where it is not the strands'"},
-    READ_OPTIONS,
+    JOB_OPTIONS,
     {0},
 };
+
+static const struct option_spec retarget_options[] = {
+    {"source", 0, "HEAD|FILE", "the head that the hair is on (of a groom: the one it was made with)"},
+    {"source-skeleton", 0, "FILE", "its bones, JSON; made of the head where not given"},
+    {"skeleton", 0, "FILE", "the same bones in the target; the source's, carried over, where not given"},
+    {"dense", 0, NULL, "of a groom: carry its strands as they are evaluated"},
+    {"revision", 0, "N", "of a groom (the latest)"},
+    {"guides", 0, "N", "strands that are adapted together (300)"},
+    {"iterations", 0, "N", "in each scale, at most (15)"},
+    {"mode", 0, "M", "multiscale or global (multiscale)"},
+    {"seed", 0, "N", "of the clustering that chooses guides (1)"},
+    JOB_OPTIONS,
+    {0},
+};
+
+static const struct option_spec schema_options[] = {{"kind", 0, "KIND", "of job: fit or retarget (fit)"}, {0}};
 
 static const struct option_spec list_options[] = {
     {"limit", 0, "N", "rows at most"},
@@ -232,6 +251,7 @@ const struct command groomctl_commands[] = {
     {"upload", "FILE", 1, 1, upload_options, "upload dense strands", command_upload},
     {"upload-head", "FILE", 1, 1, upload_options, "upload a head or body mesh (OBJ, PLY)", command_upload_head},
     {"fit", "STRANDS|FILE", 1, 1, fit_options, "fit a procedural groom; with -o all the way from file to file", command_fit},
+    {"retarget", "STRANDS|GROOM|FILE HEAD|FILE...", 2, 17, retarget_options, "carry a hairstyle to other heads; with -o to a file", command_retarget},
     {"status", "JOB...", 1, MANY, NULL, "where jobs stand", command_status},
     {"watch", "JOB...", 0, MANY, watch_options, "follow jobs live, to their ends", command_watch},
     {"cancel", "JOB...", 1, MANY, NULL, "stop jobs", command_cancel},
@@ -258,7 +278,7 @@ const struct command groomctl_commands[] = {
     {"revert", "GROOM REVISION", 2, 2, edit_options, "a new revision that is the same as an earlier one", command_revert},
     {"import", "FILE", 1, 1, NULL, "a groom document of another server", command_import},
     {"sample", "", 0, 0, sample_options, "make a reconstruction with known truth, without a server", command_sample},
-    {"options", "", 0, 0, NULL, "every option of a fit, with its default", command_options},
+    {"options", "", 0, 0, schema_options, "every option of a kind of job, with its default", command_options},
     {"health", "", 0, 0, NULL, "whether the server is alive and ready", command_health},
     {"whoami", "", 0, 0, NULL, "whose token this is, what for, within which limits", command_whoami},
     {"audit", "", 0, 0, page_options, "who changed what, newest first (scope admin)", command_audit},

@@ -23,6 +23,7 @@ struct carrying {
     struct work_link *link;
     const struct order *order;
     const struct groom_context *context;
+    struct groom_context reading;           /* the same, but that what is read is no progress of the stage */
     struct progress_report *progress;
     struct groom_diag *diag;
 
@@ -67,7 +68,7 @@ static groom_status read_uploaded(struct carrying *c)
     if (input->format[0])
         st = groom_format_parse(input->format, &options.format, c->diag);
     if (st == GROOM_OK)
-        st = groom_strands_read(&source, &options, c->context, &c->strands, NULL, c->diag);
+        st = groom_strands_read(&source, &options, &c->reading, &c->strands, NULL, c->diag);
     blob_release(&blob);
     return st;
 }
@@ -76,7 +77,7 @@ static groom_status take_subject(struct carrying *c)
 {
     if (c->order->strands.blob.sha256[0])
         return read_uploaded(c);
-    return receive_strands(c->link, c->context, &c->strands, c->diag);
+    return receive_strands(c->link, &c->reading, &c->strands, c->diag);
 }
 
 /* --- what depends on the source alone ---------------------------------------------------------------- */
@@ -151,7 +152,7 @@ struct target {
 
 static groom_status open_target(struct carrying *c, uint32_t i, struct target *t)
 {
-    groom_status st = retarget_body_target(c->link, &c->order->targets[i], target_of(c, i), i, &c->body, c->context, &t->body,
+    groom_status st = retarget_body_target(c->link, &c->order->targets[i], target_of(c, i), i, &c->body, &c->reading, &t->body,
                                            c->diag);
     if (st != GROOM_OK)
         return st;
@@ -263,14 +264,15 @@ static void close_carrying(struct carrying *c)
 groom_status retarget_attempt(struct work_link *link, const struct order *order, const struct groom_context *context,
                               struct progress_report *report, struct groom_diag *diag)
 {
-    struct carrying c = {.link = link, .order = order, .context = context, .progress = report, .diag = diag, .result = -1};
+    struct carrying c = {.link = link, .order = order, .context = context, .progress = report, .diag = diag, .result = -1,
+                         .reading = {.allocator = context->allocator, .pool = context->pool}};
     groom_status st = open_carrying(&c);
     if (st == GROOM_OK)
         st = begin_stage(&c, "prepare", 0);
     if (st == GROOM_OK)
         st = take_subject(&c);
     if (st == GROOM_OK)
-        st = retarget_body_source(link, &order->source, cJSON_GetObjectItemCaseSensitive(c.request, "source"), context,
+        st = retarget_body_source(link, &order->source, cJSON_GetObjectItemCaseSensitive(c.request, "source"), &c.reading,
                                   &c.body, diag);
     if (st == GROOM_OK && c.strands)
         st = prepare(&c);

@@ -1,7 +1,9 @@
 // Retargeting: strands and grooms are carried from the head that they are on to others.
 import test from 'node:test';
 import assert from 'node:assert/strict';
-import { startDaemon } from '../support/daemon.mjs';
+import { readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { groomctl, startDaemon } from '../support/daemon.mjs';
 import { array, decode, expect, groom_document, hair, refused, startIdleDaemon } from '../support/api.mjs';
 
 const N = 60, M = 12, CENTRE = [0, 1.6, 0], RADIUS = 0.1;
@@ -209,4 +211,29 @@ test('a preparation that is none is made anew', async (t) => {
   daemon.args = []; // the real worker
   await daemon.start();
   assert.ok((await carried(daemon, asked)).result.groom);
+});
+
+test('groomctl carries from files to a file, and says what it needs', async (t) => {
+  const daemon = await startDaemon(t);
+  const file = (name, bytes) => { const path = join(daemon.folder, name); writeFileSync(path, bytes); return path; };
+  const bob = file('bob.hair', hair(N, M, strands())), ann = file('ann.obj', ball()), mara = file('mara.obj', ball(WIDE)), tim = file('tim.obj', ball([0.8, 0.8, 0.8]));
+  const out = join(daemon.folder, 'out.json');
+  const done = await groomctl(daemon, ['retarget', bob, mara, '--source', ann, '--guides', '12', '-o', out]);
+  assert.equal(done.status, 0, done.stderr);
+  assert.match(done.stdout, /grm_\S+ on head_/);
+  assert.match(done.stdout, /vertices inside +\d+ +0\n/);
+  outside(JSON.parse(readFileSync(out)).strands, WIDE);
+  const many = await groomctl(daemon, ['retarget', bob, mara, tim, '--source', ann, '--guides', '12', '--wait']);
+  assert.equal(many.status, 0, many.stderr);
+  assert.equal(many.stdout.match(/ on head_/g).length, 2);
+  for (const [args, complaint] of [[[bob, mara], /--source is missing/], [[bob, mara, tim, '--source', ann, '-o', out], /--output goes with one target/],
+    [[bob, mara, '--source', ann, '--dense'], /are for grooms/], [[bob, mara, '--source', ann, '-o', 'out.xyz'], /no extension that names a format/]]) {
+    const refusal = await groomctl(daemon, ['retarget', ...args]);
+    assert.equal(refusal.status, 2);
+    assert.match(refusal.stderr, complaint);
+  }
+  const torn = await groomctl(daemon, ['retarget', bob, mara, '--source', file('torn.obj', 'v 0 0 0\nf 1 2 3\n')]);
+  assert.equal(torn.status, 1);
+  assert.match(torn.stderr, /torn.obj|face 0/);
+  assert.match((await groomctl(daemon, ['options', '--kind', 'retarget'])).stdout, /^alpha +3000 /m);
 });
