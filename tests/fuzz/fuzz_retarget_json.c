@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "groom/hairline.h"
 #include "groom/skeleton.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_bytes);
@@ -19,9 +20,22 @@ static void fuzz_skeleton(const char *text, size_t n_bytes)
     free(json);
 }
 
+static void fuzz_hairline(const char *text, size_t n_bytes)
+{
+    static struct groom_hairline hairline, again;
+    char *json;
+    if (groom_hairline_parse(text, n_bytes, &hairline, NULL) != GROOM_OK || groom_hairline_print(&hairline, &json, NULL) != GROOM_OK)
+        return;
+    if (groom_hairline_parse(json, strlen(json), &again, NULL) != GROOM_OK || memcmp(&hairline, &again, sizeof again) != 0)
+        abort();
+    free(json);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_bytes)
 {
-    if (n_bytes)
+    if (n_bytes) {
         fuzz_skeleton((const char *)bytes, n_bytes);
+        fuzz_hairline((const char *)bytes, n_bytes);
+    }
     return 0;
 }
