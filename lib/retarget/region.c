@@ -123,6 +123,11 @@ static double side_length(const struct groom_scalp_region *region)
     return sqrt(4 / sqrt(3) * area / region->n_roots);
 }
 
+static groom_status need_boundary(const struct sheet *sheet, struct groom_diag *diag)
+{
+    return sheet->n_loop ? GROOM_OK : groom_fail(diag, GROOM_EDEGENERATE, "the scalp has no boundary: it covers the whole surface");
+}
+
 static groom_status find_scalp(struct groom_scalp_region *region, double closing, unsigned char *set, double *distance,
                                struct groom_diag *diag)
 {
@@ -135,7 +140,8 @@ static groom_status find_scalp(struct groom_scalp_region *region, double closing
     int sound = n_roots_in && close_gaps(region, closing, opening, set, distance) && surface_fill(&region->surface, set) &&
                 surface_keep_largest(&region->surface, set, n_roots_in) && surface_fill(&region->surface, set);
     memory_release(region->allocator, n_roots_in, n, sizeof *n_roots_in);
-    return sound ? sheet_init(&region->scalp, &region->surface, set, diag) : no_memory(diag);
+    groom_status st = sound ? sheet_init(&region->scalp, &region->surface, set, diag) : no_memory(diag);
+    return st == GROOM_OK ? need_boundary(&region->scalp, diag) : st;
 }
 
 static groom_status find_patch(struct groom_scalp_region *region, double reach, unsigned char *set, double *distance,
@@ -147,6 +153,8 @@ static groom_status find_patch(struct groom_scalp_region *region, double reach, 
         if (!widen(region, reach, set, distance))
             return no_memory(diag);
         st = sheet_init(&region->patch, &region->surface, set, diag);
+        if (st == GROOM_OK)
+            st = need_boundary(&region->patch, diag);
         if (st != GROOM_EDEGENERATE)
             break;
     }

@@ -49,14 +49,16 @@ groom_status surface_init(struct surface *surface, const struct groom_mesh *mesh
     struct mesh_sides sides = {0};
     uint32_t n = mesh->n_triangles;
     *surface = (struct surface){.mesh = mesh, .n_vertices = mesh->n_vertices, .n_triangles = n, .allocator = allocator};
+    surface->welded = memory_array(allocator, mesh->n_vertices, sizeof *surface->welded);
     surface->corners = memory_array(allocator, n, sizeof *surface->corners);
     surface->across = memory_array(allocator, n, sizeof *surface->across);
     surface->star_first = memory_array(allocator, (size_t)mesh->n_vertices + 1, sizeof *surface->star_first);
     surface->star = memory_array(allocator, (size_t)3 * n, sizeof *surface->star);
-    groom_status st = surface->corners && surface->across && surface->star_first && surface->star
+    groom_status st = surface->welded && surface->corners && surface->across && surface->star_first && surface->star
                           ? mesh_sides_init(&sides, mesh, allocator, diag)
                           : groom_fail(diag, GROOM_ENOMEM, "no memory for the surface of the mesh");
     if (st == GROOM_OK) {
+        memcpy(surface->welded, sides.welded, mesh->n_vertices * sizeof *surface->welded);
         for (uint32_t t = 0; t < n; t++)
             for (int i = 0; i < 3; i++)
                 surface->corners[t][i] = sides.welded[mesh->triangles[t][i]];
@@ -71,6 +73,7 @@ void surface_finish(struct surface *surface)
 {
     if (!surface->allocator)
         return;
+    memory_release(surface->allocator, surface->welded, surface->n_vertices, sizeof *surface->welded);
     memory_release(surface->allocator, surface->corners, surface->n_triangles, sizeof *surface->corners);
     memory_release(surface->allocator, surface->across, surface->n_triangles, sizeof *surface->across);
     memory_release(surface->allocator, surface->star_first, (size_t)surface->n_vertices + 1, sizeof *surface->star_first);
@@ -441,8 +444,6 @@ groom_status sheet_init(struct sheet *sheet, const struct surface *surface, cons
         number(sheet, surface, set);
         find_rows(sheet, scratch);
         find_loops(sheet, surface, scratch);
-        if (sheet->n_loop < 3)
-            st = groom_fail(diag, GROOM_EDEGENERATE, "the scalp has no boundary: it covers the whole surface");
     } else {
         st = groom_fail(diag, GROOM_ENOMEM, "no memory for a piece of the surface");
     }

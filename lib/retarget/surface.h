@@ -16,6 +16,7 @@
 struct surface {
     const struct groom_mesh *mesh;
     uint32_t n_vertices, n_triangles;
+    uint32_t *welded;            /* [n_vertices] the lowest vertex at the same place */
     uint32_t (*corners)[3];      /* [n_triangles] welded */
     uint32_t (*across)[3];       /* [n_triangles] the triangle across the side opposite to each corner, where exactly
                                     two meet and agree in direction; else SURFACE_NONE */
@@ -58,7 +59,7 @@ struct sheet {
     uint32_t *triangle_of;       /* [n_triangles] of the surface, ascending */
     uint32_t (*triangles)[3];    /* [n_triangles] */
     uint32_t (*across)[3];       /* [n_triangles] within the sheet */
-    uint32_t n_loop, *loop;      /* the longest boundary loop, the sheet on its left; room for n_vertices */
+    uint32_t n_loop, *loop;      /* the longest boundary loop, the sheet on its left; 0: it is closed */
     uint32_t n_loops;            /* all */
     uint32_t *row_first, *row;   /* [n_vertices + 1] the neighbours of each vertex and itself, ascending */
     uint32_t *local_vertex, *local_triangle; /* [of the surface] SURFACE_NONE where not in the sheet */
@@ -67,7 +68,7 @@ struct sheet {
 };
 
 /* set      at least one triangle
- * returns  GROOM_OK, GROOM_EDEGENERATE (no boundary), GROOM_ENOMEM; finish it in any case */
+ * returns  GROOM_OK, GROOM_ENOMEM; finish it in any case */
 GROOM_MUST_CHECK groom_status sheet_init(struct sheet *sheet, const struct surface *surface, const unsigned char *set,
                                          struct groom_diag *diag);
 void sheet_finish(struct sheet *sheet); /* takes what is zeroed */

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "groom/correspondence.h"
 #include "groom/hairline.h"
 #include "groom/skeleton.h"
 
@@ -31,9 +32,21 @@ static void fuzz_hairline(const char *text, size_t n_bytes)
     free(json);
 }
 
+static void fuzz_landmarks(const char *text, size_t n_bytes)
+{
+    static struct groom_landmarks landmarks, again;
+    char *json;
+    if (groom_landmarks_parse(text, n_bytes, &landmarks, NULL) != GROOM_OK || groom_landmarks_print(&landmarks, &json, NULL) != GROOM_OK)
+        return;
+    if (groom_landmarks_parse(json, strlen(json), &again, NULL) != GROOM_OK || memcmp(&landmarks, &again, sizeof again) != 0)
+        abort();
+    free(json);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_bytes)
 {
     if (n_bytes) {
+        fuzz_landmarks((const char *)bytes, n_bytes);
         fuzz_skeleton((const char *)bytes, n_bytes);
         fuzz_hairline((const char *)bytes, n_bytes);
     }
