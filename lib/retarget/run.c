@@ -241,6 +241,30 @@ static groom_status adapt_fine(struct job *job, struct gathered *guides, float (
     return st;
 }
 
+/* Past the paper: from the two scales' result on, all strands together. Guides come from the coarse scale too stiff,
+ * and the others hang on them; a few iterations on the whole hairstyle let both go where Eq. 1 wants them. */
+static groom_status adapt_whole(struct job *job, float (*result)[3], struct groom_diag *diag)
+{
+    struct groom_retarget_report *report = job->report;
+    const struct groom_strands *strands = job->source->strands;
+    struct gathered g;
+    groom_status st = gather(job, NULL, strands->n_strands, &job->source->among_all, &g, diag);
+    if (st == GROOM_OK) {
+        memcpy(g.hair.p, result, strands->n_vertices * sizeof *result);
+        st = coupled_energy(job, &g.hair, g.hair.hat, &report->before, diag);
+    }
+    if (st == GROOM_OK)
+        st = coupled_energy(job, &g.hair, (const float(*)[3])g.hair.p, &report->two_scales, diag);
+    if (st == GROOM_OK)
+        st = coupled_solve(job, &g.hair, job->options->sweeps, &report->iterations_whole, NULL, diag);
+    if (st == GROOM_OK)
+        st = coupled_energy(job, &g.hair, (const float(*)[3])g.hair.p, &report->after, diag);
+    if (st == GROOM_OK)
+        scatter(job, NULL, &g.hair, result);
+    gathered_finish(&g, job->allocator);
+    return st;
+}
+
 groom_status job_adapt(struct job *job, float (*result)[3], struct groom_diag *diag)
 {
     const struct groom_retarget_source *source = job->source;
@@ -259,6 +283,10 @@ groom_status job_adapt(struct job *job, float (*result)[3], struct groom_diag *d
         st = adapt_fine(job, &g, result, diag);
     job->report->seconds_fine = now() - start;
     gathered_finish(&g, job->allocator);
+    start = now();
+    if (st == GROOM_OK && source_has_fine(source) && job->options->sweeps > 0)
+        st = adapt_whole(job, result, diag);
+    job->report->seconds_whole = now() - start;
     return st;
 }
 

@@ -118,7 +118,7 @@ groom_status source_index_guides(struct groom_retarget_source *source, struct gr
     return GROOM_OK;
 }
 
-static groom_status find_anchors(struct groom_retarget_source *source, const uint32_t *regions,
+groom_status source_find_anchors(struct groom_retarget_source *source, const uint32_t *regions,
                                  const struct groom_context *context, struct groom_diag *diag)
 {
     uint32_t *made = NULL, n = source->body->n_triangles;
@@ -142,7 +142,7 @@ groom_status groom_retarget_source_create(const struct groom_strands *strands, c
     groom_status st = source_init(&source, strands, body, skeleton, regions, options, context, diag);
     if (st != GROOM_OK)
         return st;
-    if ((st = find_anchors(source, regions, context, diag)) != GROOM_OK)
+    if ((st = source_find_anchors(source, regions, context, diag)) != GROOM_OK)
         goto out;
     if (options->mode == GROOM_RETARGET_MULTISCALE && (st = guides_choose(source, context, diag)) != GROOM_OK)
         goto out;

@@ -64,6 +64,9 @@ groom_status retarget_options_check(const struct groom_retarget_options *options
 
 /* --- what groom_retarget_source_create does, in its order ------------------------ */
 
+/* The anchors, with regions of the skeleton's own where there are none. */
+groom_status source_find_anchors(struct groom_retarget_source *source, const uint32_t *regions,
+                                 const struct groom_context *context, struct groom_diag *diag);
 /* Bone, surface point and distance of every particle (Eq. 2). */
 groom_status anchors_find(struct groom_retarget_source *source, const uint32_t *regions,
                           const struct groom_context *context, struct groom_diag *diag);

@@ -4,6 +4,7 @@
  *     groom_retarget_source_create(strands, body, skeleton, NULL, &options, context, &source, diag)  of the source alone
  *     groom_retarget_source_save / _load                                      kept with the strands
  *     groom_retarget_run(source, &target, &options, context, out, &report, diag)   once a target
+ *     groom_retarget_groom(groom, ...)                                         a procedural groom
  *
  * Everything is in metres. The two bodies have the same triangles and similar poses; a body is closed or
  * open only at a cut, right side out. Results are the same bits for any pool. */
@@ -22,6 +23,8 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+struct groom;
 
 /* --- options ---------------------------------------------------------------- */
 
@@ -112,8 +115,8 @@ struct groom_retarget_target {
     const float (*roots)[3];               /* [n_strands] where a hairline edit put them, or NULL: where they are carried to */
 };
 
-/* The terms of Eq. 1 over all particles, with the neighbours of the scale that was solved last (those of the
- * whole hairstyle in the global mode, else guides among guides and the other strands against guides). */
+/* The terms of Eq. 1 over all particles, with the neighbours of the scale that was solved last: those of the
+ * whole hairstyle in the global mode and after sweeps, else guides among guides and the other strands against guides. */
 struct groom_retarget_energy {
     double shape; /* Eq. 7 */
     double inter; /* Eqs. 10, 14, 21; without alpha */
@@ -141,12 +144,13 @@ struct groom_retarget_report {
     uint64_t n_smoothed;              /* particles in the index set of Eq. 6 */
     uint64_t n_without_bone;          /* particles that no bone's ray reached: they moved with the nearest surface */
     struct groom_retarget_energy before, after; /* of the initial transfer, of the result */
-    uint32_t iterations_coarse, iterations_fine; /* the global mode's are coarse */
+    struct groom_retarget_energy two_scales;    /* with sweeps: what they started from, with the same neighbours as after */
+    uint32_t iterations_coarse, iterations_fine, iterations_whole; /* the global mode's are coarse; whole: sweeps */
     struct groom_retarget_step coarse[GROOM_RETARGET_MAX_HISTORY]; /* [iterations_coarse], the first ones */
     struct groom_retarget_inside inside_before, inside_after;
     double length_ratio_min, length_ratio_median, length_ratio_max; /* of strands, result over source */
     double movement_mean, movement_max;                  /* of vertices from the initial transfer, metres */
-    double seconds_initial, seconds_coarse, seconds_fine, seconds_clearance, seconds_total;
+    double seconds_initial, seconds_coarse, seconds_fine, seconds_whole, seconds_clearance, seconds_total;
 };
 
 /* Values a vertex for colours; each may be NULL. */
@@ -184,6 +188,35 @@ GROOM_MUST_CHECK groom_status groom_retarget_run(const struct groom_retarget_sou
  * malloc'd, for the caller to free(). */
 GROOM_MUST_CHECK groom_status groom_retarget_report_print(const struct groom_retarget_report *report, char **json,
                                                           struct groom_diag *diag);
+
+/* --- procedural grooms --------------------------------------------------------------- */
+
+/* Carry a procedural groom over: its guides are the coarse scale and are adapted together; roots, guides and
+ * scalp coordinates move, instancing, operators and their random numbers stay, so that curl and clump are as
+ * before. A groom made of strands has these carried over in place of guides. Of layers, control points are
+ * carried as particles are, frames with the box of the body, strands that are blended with as strands.
+ * groom     borrowed
+ * body, skeleton, regions  of the source, as for groom_retarget_source_create
+ * target    roots: [n_strands + n_guides], the strands' and then the guides' (groom_retarget_groom_roots), or NULL
+ * options   guides and mode count only for a groom made of strands
+ * out       owned by the caller
+ * report    of the guides (of the strands, where the groom is made of them), but for inside_after: of the strands as
+ *           the operators make them (layers aside), which may bring some into the body that the guides are not in. May be NULL
+ * returns   GROOM_OK, GROOM_EINVAL, GROOM_ENOMEM, GROOM_ECANCELLED */
+GROOM_MUST_CHECK groom_status groom_retarget_groom(const struct groom *groom, const struct groom_mesh *body,
+                                                   const struct groom_skeleton *skeleton, const uint32_t *regions,
+                                                   const struct groom_retarget_target *target,
+                                                   const struct groom_retarget_options *options,
+                                                   const struct groom_context *context, struct groom **out,
+                                                   struct groom_retarget_report *report, struct groom_diag *diag);
+
+/* Only the roots as they are carried to the target, of the strands and then of the guides.
+ * roots    [n_strands + n_guides] */
+GROOM_MUST_CHECK groom_status groom_retarget_groom_roots(const struct groom *groom, const struct groom_mesh *body,
+                                                         const struct groom_skeleton *skeleton, const uint32_t *regions,
+                                                         const struct groom_retarget_target *target,
+                                                         const struct groom_context *context, float (*roots)[3],
+                                                         struct groom_diag *diag);
 
 #ifdef __cplusplus
 }
