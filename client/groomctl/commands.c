@@ -54,6 +54,8 @@ static const struct option_spec retarget_options[] = {
     {"source", 0, "HEAD|FILE", "the head that the hair is on (of a groom: the one it was made with)"},
     {"source-skeleton", 0, "FILE", "its bones, JSON; made of the head where not given"},
     {"skeleton", 0, "FILE", "the same bones in the target; the source's, carried over, where not given"},
+    {"landmarks", 0, "FILE", "the same places on both heads, JSON, where their triangles differ"},
+    {"hairline", 0, "FILE", "a curve on the target that the hair is to begin at, JSON (see: groomctl hairline)"},
     {"dense", 0, NULL, "of a groom: carry its strands as they are evaluated"},
     {"revision", 0, "N", "of a groom (the latest)"},
     {"guides", 0, "N", "strands that are adapted together (300)"},
@@ -61,6 +63,17 @@ static const struct option_spec retarget_options[] = {
     {"mode", 0, "M", "multiscale or global (multiscale)"},
     {"seed", 0, "N", "of the clustering that chooses guides (1)"},
     JOB_OPTIONS,
+    {0},
+};
+
+static const struct option_spec hairline_options[] = {
+    {"source", 0, "HEAD|FILE", "the head that the hair is on (of a groom: the one it was made with)"},
+    {"points", 0, "N", "of the line (33)"},
+    {"output", 'o', "FILE", "write it there"},
+    {"revision", 0, "N", "of a groom (the latest)"},
+    {"head-unit", 0, "U", "of the heads' files, where it is not the strands'"},
+    {"head-up", 0, "A", "of the heads' files, where it is not the strands'"},
+    READ_OPTIONS,
     {0},
 };
 
@@ -252,6 +265,7 @@ const struct command groomctl_commands[] = {
     {"upload-head", "FILE", 1, 1, upload_options, "upload a head or body mesh (OBJ, PLY)", command_upload_head},
     {"fit", "STRANDS|FILE", 1, 1, fit_options, "fit a procedural groom; with -o all the way from file to file", command_fit},
     {"retarget", "STRANDS|GROOM|FILE HEAD|FILE...", 2, 17, retarget_options, "carry a hairstyle to other heads; with -o to a file", command_retarget},
+    {"hairline", "STRANDS|GROOM|FILE HEAD|FILE", 2, 2, hairline_options, "its front hairline on another head, as JSON to edit", command_hairline},
     {"status", "JOB...", 1, MANY, NULL, "where jobs stand", command_status},
     {"watch", "JOB...", 0, MANY, watch_options, "follow jobs live, to their ends", command_watch},
     {"cancel", "JOB...", 1, MANY, NULL, "stop jobs", command_cancel},

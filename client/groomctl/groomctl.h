@@ -40,6 +40,7 @@ int groomctl_usage_error(const char *command, const char *format, ...) __attribu
 int command_upload(struct groomctl *ctl, const struct arguments *arguments);
 int command_upload_head(struct groomctl *ctl, const struct arguments *arguments);
 int command_fit(struct groomctl *ctl, const struct arguments *arguments);
+int command_hairline(struct groomctl *ctl, const struct arguments *arguments);
 int command_retarget(struct groomctl *ctl, const struct arguments *arguments);
 int command_status(struct groomctl *ctl, const struct arguments *arguments);
 int command_watch(struct groomctl *ctl, const struct arguments *arguments);

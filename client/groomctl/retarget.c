@@ -1,11 +1,13 @@
-/* retarget: carry strands or a groom from the head that they are on to others. */
+/* retarget: carry strands or a groom from the head that they are on to others; hairline: today's line on another. */
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "client/groomctl/json_path.h"
+#include "client/groomctl/output_file.h"
 #include "client/groomctl/read_file.h"
 #include "client/groomctl/submit.h"
+#include "proto/url.h"
 
 /* --- what is carried ------------------------------------------------------------------------ */
 
@@ -57,12 +59,30 @@ static int take_head(struct groomctl *ctl, const struct arguments *arguments, co
     return status;
 }
 
+/* Landmarks may stand in an object of that name, as the library prints them. */
+static void unwrap(cJSON *body, const char *name)
+{
+    cJSON *inner = cJSON_DetachItemFromObjectCaseSensitive(cJSON_GetObjectItemCaseSensitive(body, name), name);
+    if (inner)
+        cJSON_ReplaceItemInObjectCaseSensitive(body, name, inner);
+}
+
+static int take_parts(const struct arguments *arguments, cJSON *body)
+{
+    static const char *const parts[] = {"skeleton", "landmarks", "hairline"};
+    int status = DONE;
+    for (size_t i = 0; status == DONE && i < sizeof parts / sizeof parts[0]; i++)
+        status = take_file(arguments, parts[i], parts[i], body);
+    unwrap(body, "landmarks");
+    return status;
+}
+
 static int take_target(struct groomctl *ctl, const struct arguments *arguments, const char *what, cJSON *targets)
 {
     cJSON *body = cJSON_CreateObject();
     cJSON_AddItemToArray(targets, body);
     int status = take_head(ctl, arguments, what, body);
-    return status == DONE ? take_file(arguments, "skeleton", "skeleton", body) : status;
+    return status == DONE ? take_parts(arguments, body) : status;
 }
 
 static int take_bodies(struct groomctl *ctl, const struct arguments *arguments, cJSON *body)
@@ -132,7 +152,14 @@ static void print_report(struct groomctl *ctl, const cJSON *job)
     }
 }
 
-/* --- the command ---------------------------------------------------------------------------------------- */
+/* --- the commands --------------------------------------------------------------------------------------- */
+
+static int check_source(const char *command, const struct arguments *arguments)
+{
+    if (is_groom(arguments->operands[0]) || argument(arguments, "source"))
+        return DONE;
+    return groomctl_usage_error(command, "--source is missing: the head that %s is on, an id or a file", arguments->operands[0]);
+}
 
 static int run(struct groomctl *ctl, const struct arguments *arguments, cJSON *body)
 {
@@ -152,20 +179,69 @@ static int run(struct groomctl *ctl, const struct arguments *arguments, cJSON *b
 
 int command_retarget(struct groomctl *ctl, const struct arguments *arguments)
 {
-    const char *one = argument(arguments, "output") ? "output" : argument(arguments, "groom-id-file") ? "groom-id-file"
-                    : argument(arguments, "skeleton")                                                 ? "skeleton"
-                                                                                                      : NULL;
+    static const char *const of_one[] = {"output", "groom-id-file", "skeleton", "landmarks", "hairline"};
     int status = submit_check_output("retarget", arguments);
+    for (size_t i = 0; status == DONE && i < sizeof of_one / sizeof of_one[0]; i++)
+        if (arguments->n_operands > 2 && argument(arguments, of_one[i]))
+            status = groomctl_usage_error("retarget", "--%s goes with one target; there are %zu", of_one[i],
+                                          arguments->n_operands - 1);
+    if (status == DONE)
+        status = check_source("retarget", arguments);
     if (status != DONE)
         return status;
-    if (arguments->n_operands > 2 && one)
-        return groomctl_usage_error("retarget", "--%s goes with one target; there are %zu", one, arguments->n_operands - 1);
-    if (!is_groom(arguments->operands[0]) && !argument(arguments, "source"))
-        return groomctl_usage_error("retarget", "--source is missing: the head that %s is on, an id or a file",
-                                    arguments->operands[0]);
     cJSON *body = cJSON_CreateObject();
     cJSON_AddStringToObject(body, "kind", "retarget");
     status = run(ctl, arguments, body);
+    cJSON_Delete(body);
+    return status;
+}
+
+/* The line of the first target's body: its head stands in the path. */
+static int ask_hairline(struct groomctl *ctl, const struct arguments *arguments, cJSON *body, cJSON **answer)
+{
+    cJSON *source = cJSON_AddObjectToObject(body, "source"), *target = cJSON_CreateObject();
+    struct url url;
+    int status = take_head(ctl, arguments, argument(arguments, "source"), source);
+    if (status == DONE)
+        status = take_head(ctl, arguments, arguments->operands[1], target);
+    if (status == DONE) {
+        url_init(&url, "/v1/heads");
+        url_segment(&url, api_text(target, "head"));
+        url_segment(&url, "hairline");
+        status = api_json(ctl, "POST", url.text, body, NULL, answer);
+    }
+    cJSON_Delete(target);
+    return status;
+}
+
+/* As a target takes it: move its points and hand it to --hairline. Takes the points over. */
+static int save_line(const struct groomctl *ctl, cJSON *points, const char *path)
+{
+    cJSON *line = cJSON_CreateObject();
+    cJSON_AddItemToObject(line, "points", points);
+    char *text = path ? cJSON_Print(line) : NULL;
+    int saved = !path || (text && output_file_save(path, text, strlen(text)));
+    if (!path)
+        api_print(ctl, line);
+    cJSON_free(text);
+    cJSON_Delete(line);
+    return saved ? DONE : REFUSED;
+}
+
+int command_hairline(struct groomctl *ctl, const struct arguments *arguments)
+{
+    const char *points = argument(arguments, "points");
+    cJSON *body = cJSON_CreateObject(), *answer = NULL;
+    int status = check_source("hairline", arguments);
+    if (points)
+        cJSON_AddItemToObject(body, "points", json_value(points));
+    if (status == DONE)
+        status = take_subject(ctl, arguments, body);
+    if (status == DONE)
+        status = ask_hairline(ctl, arguments, body, &answer);
+    if (status == DONE)
+        status = save_line(ctl, cJSON_DetachItemFromObjectCaseSensitive(answer, "front"), argument(arguments, "output"));
+    cJSON_Delete(answer);
     cJSON_Delete(body);
     return status;
 }

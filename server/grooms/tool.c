@@ -106,7 +106,8 @@ static groom_status read_problem(const struct child_result *result, struct groom
     cJSON_Delete(json);
     for (int s = 0; found && s <= (int)GROOM_EINTERNAL; s++)
         if (!strcmp(groom_status_name((groom_status)s), problem.name))
-            return groom_fail(diag, (groom_status)s, "%s", problem.detail);
+            return problem.pointer[0] ? groom_fail_field(diag, (groom_status)s, problem.pointer, "%s", problem.detail)
+                                      : groom_fail(diag, (groom_status)s, "%s", problem.detail);
     return GROOM_OK;
 }
 

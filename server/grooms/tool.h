@@ -8,7 +8,7 @@
 struct tool_arguments {
     const char *argv[48];
     size_t n, n_text;
-    char text[16384];
+    char text[65536]; /* landmarks of a head are tens of kilobytes */
 };
 void tool_arguments_init(struct tool_arguments *arguments, const struct grooms *grooms, const char *command);
 void tool_add(struct tool_arguments *arguments, const char *name, const char *format, ...)

@@ -44,6 +44,9 @@ void assets_delete_strands(struct request *request);
 void assets_delete_head(struct request *request);
 void assets_get_head_data(struct request *request);
 
+/* hairline_calls.c */
+void hairline_call_post(struct request *request);
+
 /* uploads.c: uploads in pieces */
 void uploads_call_options(struct request *request);
 int uploads_check_post(struct request *request);

@@ -2,13 +2,16 @@
  *
  *   {"strands":"str_…" | "groom":"grm_…", "revision":N, "dense":true,
  *    "source":{"head":"head_…","skeleton":{…}},
- *    "target":{"head":"head_…","skeleton":{…}} or "targets":[{…},…]}
+ *    "target":{"head":"head_…","skeleton":{…},"landmarks":[…],"hairline":{…}}, "hairline":{…}
+ *    or "targets":[{…},…]}
  *
- * The store keeps "targets" alone, and a groom with its revision. */
+ * The store keeps "targets" alone, each with its own hairline, and a groom with its revision. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "groom/correspondence.h"
+#include "groom/hairline.h"
 #include "groom/retarget.h"
 #include "groom/skeleton.h"
 #include "server/grooms/retargeted.h"
@@ -100,12 +103,34 @@ static bool is_skeleton(const char *json, size_t n, struct groom_diag *diag, gro
     return *status == GROOM_OK;
 }
 
+static bool is_hairline(const char *json, size_t n, struct groom_diag *diag, groom_status *status)
+{
+    struct groom_hairline *hairline = malloc(sizeof *hairline);
+    *status = hairline ? groom_hairline_parse(json, n, hairline, diag) : GROOM_ENOMEM;
+    free(hairline);
+    return *status == GROOM_OK;
+}
+
+/* A list here, a member of that name in the library's form. */
+static bool are_landmarks(const char *json, size_t n, struct groom_diag *diag, groom_status *status)
+{
+    struct groom_landmarks *landmarks = malloc(sizeof *landmarks);
+    char *object = NULL;
+    int length = asprintf(&object, "{\"landmarks\":%s}", json);
+    *status = landmarks && length > 0 ? groom_landmarks_parse(object, (size_t)length, landmarks, diag) : GROOM_ENOMEM;
+    if (*status == GROOM_EINVAL && strncmp(diag->pointer, "/landmarks", 10) == 0)
+        memmove(diag->pointer, diag->pointer + 10, strlen(diag->pointer + 10) + 1);
+    free(object);
+    free(landmarks);
+    return *status == GROOM_OK;
+}
+
 /* What a body may have beside its head, and the library that says whether it is one. */
 static const struct part {
     const char *name;
     bool of_target_alone;
     bool (*is_one)(const char *json, size_t n, struct groom_diag *diag, groom_status *status);
-} parts[] = {{"skeleton", false, is_skeleton}};
+} parts[] = {{"skeleton", false, is_skeleton}, {"landmarks", true, are_landmarks}, {"hairline", true, is_hairline}};
 #define N_PARTS (sizeof parts / sizeof parts[0])
 
 static bool take_part(struct request *request, const struct part *part, const cJSON *value, const char *pointer,
@@ -134,7 +159,7 @@ static bool take_part(struct request *request, const struct part *part, const cJ
 
 static bool only_known(struct request *request, const cJSON *body, bool target, const char *pointer)
 {
-    const char *members = "head skeleton";
+    const char *members = target ? "head skeleton landmarks hairline" : "head skeleton";
     const cJSON *item;
     char at[200];
     cJSON_ArrayForEach(item, body)
@@ -184,13 +209,28 @@ static bool take_target(struct request *request, const cJSON *target, const char
     return take_body(request, target, true, pointer, NULL, input);
 }
 
+/* "hairline" beside "target" is the contract's; it is the one target's. */
+static bool take_single(struct request *request, const cJSON *body, cJSON *targets)
+{
+    const cJSON *hairline = member(body, "hairline"), *target = member(body, "target");
+    if (!take_target(request, target, "/target", targets))
+        return false;
+    if (!hairline)
+        return true;
+    if (member(target, "hairline")) {
+        respond_bad_field(request, 400, "/hairline", "the target has a hairline of its own: give one of the two");
+        return false;
+    }
+    return take_part(request, &parts[N_PARTS - 1], hairline, "", cJSON_GetArrayItem(targets, 0));
+}
+
 static bool take_many(struct request *request, const cJSON *body, cJSON *targets)
 {
     const cJSON *list = member(body, "targets"), *target;
     char pointer[32];
     int n = 0;
-    if (member(body, "target")) {
-        respond_bad_field(request, 400, "/targets", "give \"target\" or \"targets\", not both");
+    if (member(body, "target") || member(body, "hairline")) {
+        respond_bad_field(request, 400, "/targets", "give \"target\" (and \"hairline\"), or \"targets\" with a hairline each");
         return false;
     }
     if (!cJSON_IsArray(list) || cJSON_GetArraySize(list) < 1 || cJSON_GetArraySize(list) > GROOMS_MOST_TARGETS) {
@@ -216,7 +256,7 @@ static bool take_inputs(struct request *request, const cJSON *body, cJSON *input
         return refuse_memory(request);
     return take_body(request, member(body, "source"), false, "/source", head, source) &&
            (member(body, "targets") ? take_many(request, body, targets)
-                                      : take_target(request, member(body, "target"), "/target", targets));
+                                      : take_single(request, body, targets));
 }
 
 static groom_status complete_options(const char *json, size_t n, char **complete, struct groom_diag *diag)
@@ -227,4 +267,4 @@ static groom_status complete_options(const char *json, size_t n, char **complete
 }
 
 const struct job_kind job_kind_retarget = {
-    "retarget", "strands groom revision dense source target targets", take_inputs, complete_options};
+    "retarget", "strands groom revision dense source target targets hairline", take_inputs, complete_options};

@@ -32,6 +32,8 @@ const struct route http_routes[] = {
     {"DELETE", "/v1/heads/{id}", assets_delete_head, BODY_NONE, LANE_FAST, "", 0, NULL},
     {"GET", "/v1/heads/{id}/data", assets_get_head_data, BODY_NONE, LANE_FAST, "", 0, NULL},
 
+    {"POST", "/v1/heads/{id}/hairline", hairline_call_post, BODY_MEMORY, LANE_SLOW, "", ROUTE_LOOKS, NULL},
+
     {"OPTIONS", "/v1/uploads", uploads_call_options, BODY_NONE, LANE_INLINE, "", ROUTE_TUS | ROUTE_PUBLIC, NULL},
     {"POST", "/v1/uploads", uploads_call_post, BODY_UPLOAD, LANE_FAST, "", ROUTE_TUS | ROUTE_WAITS, uploads_check_post},
     {"GET", "/v1/uploads/{id}", uploads_call_get, BODY_NONE, LANE_FAST, "", ROUTE_TUS, NULL},

@@ -27,7 +27,7 @@ static const struct job_kind *take_kind(struct request *request, const cJSON *bo
     return NULL;
 }
 
-static bool only_known(struct request *request, const cJSON *body, const struct job_kind *kind)
+bool submission_only_known(struct request *request, const cJSON *body, const struct job_kind *kind)
 {
     const cJSON *member;
     char pointer[96];
@@ -119,7 +119,7 @@ static bool take_priority(struct request *request, const cJSON *body, struct sub
 
 static bool take_body(struct request *request, const cJSON *body, struct submission *submission)
 {
-    return (submission->kind = take_kind(request, body)) && only_known(request, body, submission->kind) &&
+    return (submission->kind = take_kind(request, body)) && submission_only_known(request, body, submission->kind) &&
            take_inputs(request, body, submission) && take_options(request, body, submission) &&
            take_priority(request, body, submission) &&
            webhook_take(request, body, &submission->webhook, &submission->n_webhooks);

@@ -27,6 +27,9 @@ struct job_kind {
 
 extern const struct job_kind job_kind_fit, job_kind_retarget;
 
+/* Are all members of the body the kind's own, or every kind's? returns  false where it was refused (and answered) */
+bool submission_only_known(struct request *request, const cJSON *body, const struct job_kind *kind);
+
 /* Copies the id of an upload from object[key] to inputs[key], where that upload is there.
  * pointer  of the field in the body: "/source/head"
  * returns  false where it was refused (and answered) */

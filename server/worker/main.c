@@ -28,6 +28,10 @@ static const struct command {
      "--target FILE [--target-format F] [--target-unit U] [--target-up y|z] [--head FILE] [--head-unit U] [--head-up y|z]\n"
      "                 [--drawn FILE] [--format F] [--unit U] [--up y|z]   strands on standard input; how alike they are to the\n"
      "                 target's, as JSON, on standard output. --drawn: the same groom's before stage randoms"},
+    {"hairline", worker_hairline,
+     "--source FILE [--source-unit U] [--source-up y|z] --target FILE [--target-unit U] [--target-up y|z]\n"
+     "                 [--asked JSON] [--points N] [--format F] [--unit U] [--up y|z]   strands on standard input; their\n"
+     "                 front hairline as it is carried from the source's head to the target, as JSON"},
     {"attempt", worker_attempt,
      "[--watched] one attempt of a job, as GROOM_WORK_URL and GROOM_WORK_TOKEN name it; watched by a second\n"
      "                 process that tells the daemon how it died, where the launcher cannot"},

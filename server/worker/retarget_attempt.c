@@ -16,6 +16,7 @@
 #include "server/worker/blob.h"
 #include "server/worker/receive.h"
 #include "server/worker/retarget_body.h"
+#include "server/worker/retarget_hairline.h"
 #include "server/worker/retarget_part.h"
 #include "server/worker/worker.h"
 
@@ -146,9 +147,30 @@ static groom_status prepare(struct carrying *c)
 
 struct target {
     struct retarget_body body;
+    struct retarget_hairline hairline;
     struct groom_retarget_target library;
     struct groom_retarget_report report;
 };
+
+/* From where the roots are carried to. */
+static groom_status edit_hairline(struct carrying *c, uint32_t i, struct target *t)
+{
+    const cJSON *asked = cJSON_GetObjectItemCaseSensitive(target_of(c, i), "hairline");
+    uint32_t n = c->strands->n_strands;
+    char place[40];
+    if (!asked)
+        return GROOM_OK;
+    float(*roots)[3] = malloc(n * sizeof *roots);
+    groom_status st = roots ? groom_retarget_roots(c->source, &t->library, &c->reading, roots, c->diag)
+                            : groom_fail(c->diag, GROOM_ENOMEM, "no memory for a hairline");
+    snprintf(place, sizeof place, "/targets/%u/hairline", i);
+    if (st == GROOM_OK)
+        st = retarget_hairline_edit(asked, place, t->body.mesh, &t->body.skeleton, (const float(*)[3])roots, n, &c->reading,
+                                    &t->hairline, c->diag);
+    t->library.roots = (const float(*)[3])t->hairline.roots;
+    free(roots);
+    return st;
+}
 
 static groom_status open_target(struct carrying *c, uint32_t i, struct target *t)
 {
@@ -157,10 +179,14 @@ static groom_status open_target(struct carrying *c, uint32_t i, struct target *t
     if (st != GROOM_OK)
         return st;
     t->library = (struct groom_retarget_target){.body = t->body.mesh, .skeleton = &t->body.skeleton};
-    return GROOM_OK;
+    return edit_hairline(c, i, t);
 }
 
-static void close_target(struct target *t) { retarget_body_finish(&t->body); }
+static void close_target(struct target *t)
+{
+    retarget_hairline_finish(&t->hairline);
+    retarget_body_finish(&t->body);
+}
 
 /* Of each strand, from those of its vertices. */
 static void gather(const struct groom_strands *strands, const struct groom_strands *carried,
@@ -178,6 +204,34 @@ static void gather(const struct groom_strands *strands, const struct groom_stran
         colours->depth[s] = depth;
         colours->stretch[s] = length > 0 ? (float)(groom_polyline_length(carried->points + first, n) / length) : 1;
     }
+}
+
+static void move_value(float *values, uint32_t to, uint32_t from)
+{
+    if (values)
+        values[to] = values[from];
+}
+
+/* Strands that balding gives up leave, with their numbers. */
+static void drop_bald(const unsigned char *bald, struct groom_strands *strands, const struct retarget_colours *colours)
+{
+    uint32_t n = 0, n_vertices = 0;
+    for (uint32_t s = 0; s < strands->n_strands; s++) {
+        uint32_t first = strands->first[s], n_own = strands->first[s + 1] - first;
+        if (bald[s])
+            continue;
+        memmove(strands->points + n_vertices, strands->points + first, n_own * sizeof *strands->points);
+        strands->first[n] = n_vertices;
+        n_vertices += n_own;
+        move_value(colours->movement, n, s);
+        move_value(colours->depth, n, s);
+        move_value(colours->stretch, n, s);
+        move_value(colours->density, n, s);
+        n++;
+    }
+    strands->first[n] = n_vertices;
+    strands->n_strands = n;
+    strands->n_vertices = n_vertices;
 }
 
 static groom_status run_strands(struct carrying *c, struct target *t, struct groom_strands *carried,
@@ -203,6 +257,7 @@ static groom_status write_part(struct carrying *c, struct target *t, const struc
     const struct retarget_part part = {.strands = strands, .groom = groom,
                                        .n_strands = groom ? groom->n_strands : strands->n_strands, .report = &t->report,
                                        .source_skeleton = &c->body.skeleton, .skeleton = &t->body.skeleton,
+                                       .hairline = t->hairline.report,
                                        .colours = colours ? *colours : (struct retarget_colours){0}};
     return retarget_part_write(&part, c->result, c->context, c->diag);
 }
@@ -214,12 +269,18 @@ static groom_status carry_strands(struct carrying *c, struct target *t)
     float *values = malloc(3 * (size_t)n * sizeof *values);
     if (!values)
         return groom_fail(c->diag, GROOM_ENOMEM, "no memory for the colours of the strands");
-    struct retarget_colours colours = {values, values + n, values + 2 * (size_t)n};
+    struct retarget_colours colours = {values, values + n, values + 2 * (size_t)n, t->hairline.density};
     groom_status st = groom_strands_create(n, c->strands->n_vertices, c->context, &carried, c->diag);
     if (st == GROOM_OK)
         st = run_strands(c, t, carried, &colours);
-    if (st == GROOM_OK)
-        st = write_part(c, t, carried, NULL, &colours);
+    if (st == GROOM_OK && t->hairline.n_bald == n)
+        st = groom_fail_field(c->diag, GROOM_EEMPTY, "/hairline", "the curve leaves no hair");
+    if (st == GROOM_OK) {
+        struct groom_strands kept = *carried; /* a view, which may be shorter */
+        if (t->hairline.n_bald)
+            drop_bald(t->hairline.bald, &kept, &colours);
+        st = write_part(c, t, &kept, NULL, &colours);
+    }
     groom_strands_destroy(carried);
     free(values);
     return st;

@@ -6,10 +6,10 @@
 #include <string.h>
 
 #include "groom/body.h"
+#include "groom/correspondence.h"
 #include "server/worker/blob.h"
 
-/* The complaint with its place in the job; "of the target's head" where the library names no place. */
-static groom_status complain(groom_status st, const char *place, struct groom_diag *diag)
+groom_status retarget_complain(groom_status st, const char *place, struct groom_diag *diag)
 {
     struct groom_diag of_library = *diag;
     char pointer[sizeof of_library.pointer];
@@ -57,28 +57,68 @@ static groom_status parse_skeleton(const cJSON *asked, struct groom_skeleton *sk
     return st;
 }
 
-groom_status retarget_body_source(struct work_link *link, const struct order_input *input, const cJSON *asked,
-                                  const struct groom_context *context, struct retarget_body *body, struct groom_diag *diag)
+groom_status retarget_body_open_source(const cJSON *asked, const struct groom_context *context, struct retarget_body *body,
+                                       struct groom_diag *diag)
 {
     const cJSON *skeleton = cJSON_GetObjectItemCaseSensitive(asked, "skeleton");
-    groom_status st = complain(read_mesh(link, input, context, &body->mesh, diag), "/source/head", diag);
-    if (st == GROOM_OK)
-        st = complain(make_ready(body->mesh, "/source", context, diag), "/source/head", diag);
+    groom_status st = retarget_complain(make_ready(body->mesh, "/source", context, diag), "/source/head", diag);
     if (st != GROOM_OK)
         return st;
     st = skeleton ? parse_skeleton(skeleton, &body->skeleton, diag)
                   : groom_skeleton_make(body->mesh, context, &body->skeleton, diag);
-    return complain(st, "/source/skeleton", diag);
+    return retarget_complain(st, "/source/skeleton", diag);
+}
+
+groom_status retarget_body_source(struct work_link *link, const struct order_input *input, const cJSON *asked,
+                                  const struct groom_context *context, struct retarget_body *body, struct groom_diag *diag)
+{
+    groom_status st = retarget_complain(read_mesh(link, input, context, &body->mesh, diag), "/source/head", diag);
+    return st == GROOM_OK ? retarget_body_open_source(asked, context, body, diag) : st;
 }
 
 /* --- targets --------------------------------------------------------------------------------- */
 
-static groom_status check_topology(const struct retarget_body *source, const struct groom_mesh *mesh, struct groom_diag *diag)
+static groom_status parse_landmarks(const cJSON *asked, struct groom_landmarks *landmarks, struct groom_diag *diag)
 {
-    char difference[160];
-    if (groom_topology_same(source->mesh, mesh, difference))
-        return GROOM_OK;
-    return groom_fail(diag, GROOM_EINVAL, "the source's head and this one must have the same triangles: %s", difference);
+    cJSON *object = cJSON_CreateObject();
+    cJSON_AddItemReferenceToObject(object, "landmarks", (cJSON *)asked);
+    char *text = cJSON_PrintUnformatted(object);
+    groom_status st = text ? groom_landmarks_parse(text, strlen(text), landmarks, diag)
+                           : groom_fail(diag, GROOM_ENOMEM, "no memory for landmarks");
+    cJSON_free(text);
+    cJSON_Delete(object);
+    return st;
+}
+
+/* The source's triangles laid over the mesh, in its place. What became of it stands in the attempt's log. */
+static groom_status register_mesh(const struct retarget_body *source, const cJSON *asked, const char *place,
+                                  const struct groom_context *context, struct groom_mesh **mesh, struct groom_diag *diag)
+{
+    struct groom_correspondence_report report = {0};
+    struct groom_landmarks *landmarks = asked ? malloc(sizeof *landmarks) : NULL;
+    struct groom_mesh *registered = NULL;
+    groom_status st = asked && !landmarks ? GROOM_ENOMEM : GROOM_OK;
+    if (st == GROOM_OK && asked)
+        st = parse_landmarks(asked, landmarks, diag);
+    if (st == GROOM_OK)
+        st = groom_correspondence_create(source->mesh, *mesh, landmarks, context, &registered, &report, diag);
+    free(landmarks);
+    if (st != GROOM_OK)
+        return st;
+    fprintf(stderr, "groom-worker: %s/head: registered, %.1f %% of the source covered, %.2f mm off on average, %.2f mm at most\n",
+            place, 100 * report.covered, 1000 * report.mean_distance, 1000 * report.max_distance);
+    groom_mesh_destroy(*mesh);
+    *mesh = registered;
+    return GROOM_OK;
+}
+
+/* Landmarks are followed also where the triangles are the same: they may be another head's in another order. */
+static groom_status match_topology(const struct retarget_body *source, const cJSON *landmarks, const char *place,
+                                   const struct groom_context *context, struct groom_mesh **mesh, struct groom_diag *diag)
+{
+    return !landmarks && groom_topology_same(source->mesh, *mesh, NULL)
+               ? GROOM_OK
+               : register_mesh(source, landmarks, place, context, mesh, diag);
 }
 
 static groom_status find_skeleton(const struct retarget_body *source, const cJSON *asked, struct retarget_body *body,
@@ -90,6 +130,22 @@ static groom_status find_skeleton(const struct retarget_body *source, const cJSO
     return st == GROOM_OK ? groom_skeleton_match(&source->skeleton, &body->skeleton, diag) : st;
 }
 
+groom_status retarget_body_open_target(const cJSON *asked, const char *place, const struct retarget_body *source,
+                                       const struct groom_context *context, struct retarget_body *body,
+                                       struct groom_diag *diag)
+{
+    const cJSON *landmarks = cJSON_GetObjectItemCaseSensitive(asked, "landmarks");
+    char at[64];
+    snprintf(at, sizeof at, "%.40s/head", place);
+    groom_status st = retarget_complain(make_ready(body->mesh, place, context, diag), at, diag);
+    if (st == GROOM_OK)
+        st = retarget_complain(match_topology(source, landmarks, place, context, &body->mesh, diag), place, diag);
+    snprintf(at, sizeof at, "%.40s/skeleton", place);
+    if (st == GROOM_OK)
+        st = retarget_complain(find_skeleton(source, cJSON_GetObjectItemCaseSensitive(asked, "skeleton"), body, diag), at, diag);
+    return st;
+}
+
 groom_status retarget_body_target(struct work_link *link, const struct order_input *input, const cJSON *asked,
                                   unsigned index, const struct retarget_body *source, const struct groom_context *context,
                                   struct retarget_body *body, struct groom_diag *diag)
@@ -97,15 +153,8 @@ groom_status retarget_body_target(struct work_link *link, const struct order_inp
     char place[32], at[64];
     snprintf(place, sizeof place, "/targets/%u", index);
     snprintf(at, sizeof at, "%s/head", place);
-    groom_status st = complain(read_mesh(link, input, context, &body->mesh, diag), at, diag);
-    if (st == GROOM_OK)
-        st = complain(make_ready(body->mesh, place, context, diag), at, diag);
-    if (st == GROOM_OK)
-        st = complain(check_topology(source, body->mesh, diag), at, diag);
-    snprintf(at, sizeof at, "%s/skeleton", place);
-    if (st == GROOM_OK)
-        st = complain(find_skeleton(source, cJSON_GetObjectItemCaseSensitive(asked, "skeleton"), body, diag), at, diag);
-    return st;
+    groom_status st = retarget_complain(read_mesh(link, input, context, &body->mesh, diag), at, diag);
+    return st == GROOM_OK ? retarget_body_open_target(asked, place, source, context, body, diag) : st;
 }
 
 void retarget_body_finish(struct retarget_body *body)

@@ -29,6 +29,16 @@ GROOM_MUST_CHECK groom_status retarget_body_target(struct work_link *link, const
                                                    const struct retarget_body *source,
                                                    const struct groom_context *context, struct retarget_body *body,
                                                    struct groom_diag *diag);
+/* The same of a body whose mesh has been read (with by_faces_alone).
+ * place    of the target: "/targets/0" */
+GROOM_MUST_CHECK groom_status retarget_body_open_source(const struct cJSON *asked, const struct groom_context *context,
+                                                        struct retarget_body *body, struct groom_diag *diag);
+GROOM_MUST_CHECK groom_status retarget_body_open_target(const struct cJSON *asked, const char *place,
+                                                        const struct retarget_body *source,
+                                                        const struct groom_context *context, struct retarget_body *body,
+                                                        struct groom_diag *diag);
+/* The complaint with its place in the job before the library's own pointer; st. */
+groom_status retarget_complain(groom_status st, const char *place, struct groom_diag *diag);
 void retarget_body_finish(struct retarget_body *body); /* takes zeroed */
 
 #endif

@@ -37,7 +37,8 @@ static groom_status add_colours(cJSON *line, const struct retarget_part *part)
     const struct {
         const char *name;
         const float *values;
-    } rows[] = {{"movement", part->colours.movement}, {"depth", part->colours.depth}, {"stretch", part->colours.stretch}};
+    } rows[] = {{"movement", part->colours.movement}, {"depth", part->colours.depth}, {"stretch", part->colours.stretch},
+                {"density", part->colours.density}};
     cJSON *strands = cJSON_AddObjectToObject(line, "strands");
     groom_status st = GROOM_OK;
     for (size_t i = 0; st == GROOM_OK && i < sizeof rows / sizeof rows[0]; i++) {
@@ -61,6 +62,8 @@ static groom_status describe(const struct retarget_part *part, cJSON *line, stru
         st = add_skeleton(line, "source_skeleton", part->source_skeleton, diag);
     if (st == GROOM_OK)
         st = add_skeleton(line, "skeleton", part->skeleton, diag);
+    if (part->hairline)
+        cJSON_AddItemToObject(line, "hairline", cJSON_Duplicate(part->hairline, 1));
     return st == GROOM_OK ? add_colours(line, part) : st;
 }
 

@@ -10,11 +10,14 @@
 #include "groom/retarget.h"
 #include "groom/strands.h"
 
+struct cJSON;
+
 /* Numbers of each strand, for colours; members may be NULL. */
 struct retarget_colours {
     float *movement; /* mean over its vertices, metres, from the initial transfer */
     float *depth;    /* how far below the clearance the initial transfer was at the deepest, metres */
     float *stretch;  /* its length over the source's */
+    float *density;  /* relative change of the density of roots around it, by a hairline edit */
 };
 
 /* All borrowed. */
@@ -24,6 +27,7 @@ struct retarget_part {
     uint32_t n_strands;
     const struct groom_retarget_report *report;
     const struct groom_skeleton *source_skeleton, *skeleton;
+    const struct cJSON *hairline;              /* what its edit did, or NULL */
     struct retarget_colours colours;
 };
 

@@ -1,7 +1,7 @@
 /* groom-worker: one process for one piece of work, so that whatever goes wrong in it ends it alone.
  *
  *   inspect, convert, check-groom,
- *   render, compare                 parse untrusted bytes for the daemon: standard input to standard
+ *   render, compare, hairline       parse untrusted bytes for the daemon: standard input to standard
  *                                   output, in a sandbox; exit 0, or 1 with a problem on standard output
  *   attempt                         run one attempt of one job, over HTTP (proto/work.h)
  *
@@ -24,6 +24,7 @@ int worker_convert_head(int argc, char **argv);
 int worker_check_groom(int argc, char **argv);
 int worker_render(int argc, char **argv);
 int worker_compare(int argc, char **argv);
+int worker_hairline(int argc, char **argv);
 int worker_attempt(int argc, char **argv);
 
 /* --- what they share ---------------------------------------------------------- */

@@ -42,6 +42,8 @@ test('every operation answers as it is described', async (t) => {
     await get(`/v1/${kind}/${id}/data`);
   }
 
+  await expect(daemon, 422, 'POST', `/v1/heads/${head.id}/hairline`, { body: { strands: strands.id, source: { head: head.id } } }); // no hair on it
+
   const tus = { 'Tus-Resumable': '1.0.0' }, bytes = hair(3, 4);
   await expect(daemon, 204, 'OPTIONS', '/v1/uploads');
   const created = await expect(daemon, 201, 'POST', '/v1/uploads', { headers: { ...tus, 'Upload-Length': `${bytes.length}` } });

@@ -169,7 +169,7 @@ test('what only shows while it runs fails the job, with its place', async (t) =>
     assert.equal(job.error.pointer, pointer, JSON.stringify(job.error));
     assert.match(job.error.detail, detail);
   };
-  await failed({ target: { head: coarse } }, '/targets/0/head', /same triangles: .*vertices/);
+  await failed({ target: { head: coarse } }, '/targets/0/landmarks', /266 vertices.*give landmarks/);
   const skeleton = (name) => ({ bones: [{ name, head: [0, 1.55, 0], tail: [0, 1.65, 0] }] });
   await failed({ source: { head, skeleton: skeleton('head') }, target: { head, skeleton: skeleton('skull') } }, '/targets/0/skeleton/bones', /no bone "head"/);
 });
@@ -235,5 +235,61 @@ test('groomctl carries from files to a file, and says what it needs', async (t) 
   const torn = await groomctl(daemon, ['retarget', bob, mara, '--source', file('torn.obj', 'v 0 0 0\nf 1 2 3\n')]);
   assert.equal(torn.status, 1);
   assert.match(torn.stderr, /torn.obj|face 0/);
+  const line = await groomctl(daemon, ['hairline', file('more.hair', hair(700, M, strands(700))), file('fine.obj', ball(WIDE, 24)), '--source', file('ann24.obj', ball([1, 1, 1], 24)), '--points', '9', '-o', out]);
+  assert.equal(line.status, 0, line.stderr);
+  assert.equal(JSON.parse(readFileSync(out)).points.length, 9);
   assert.match((await groomctl(daemon, ['options', '--kind', 'retarget'])).stdout, /^alpha +3000 /m);
+});
+
+test('the hairline of a target is shown, moved, and the hair grows from there', async (t) => {
+  const daemon = await startDaemon(t), n = 700, rows = 24;
+  const str = await post_strands(daemon, hair(n, M, strands(n)));
+  const head = await post_head(daemon, 'ann', [1, 1, 1], rows), target = await post_head(daemon, 'mara', WIDE, rows);
+  const line_of = async (body, at = target) => (await expect(daemon, 200, 'POST', `/v1/heads/${at}/hairline`, { body })).json;
+  const today = await line_of({ strands: str, source: { head }, points: 11 });
+  assert.equal(today.front.length, 11);
+  for (const p of today.front) assert.ok(Math.abs(measure(p, WIDE) - 1) < 0.03 && Math.abs(p[1] - CENTRE[1]) < 0.03, `${p}: near the equator, on the head`);
+  assert.ok(today.front[0][0] > 0.09 && today.front[10][0] < -0.09, 'from ear to ear');
+  assert.ok(today.front[5][2] > 0.08, 'over the forehead');
+
+  /** The line lifted by so many metres in its middle, on the surface. */
+  const lifted = (by) => today.front.map((p, i) => {
+    const y = p[1] + by * Math.sin((Math.PI * i) / 10) ** 2, k = Math.sqrt(Math.max(0, 1 - ((y - CENTRE[1]) / (RADIUS * WIDE[1])) ** 2));
+    const a = Math.atan2(p[2] / WIDE[2], p[0] / WIDE[0]);
+    return [RADIUS * WIDE[0] * k * Math.cos(a), y, RADIUS * WIDE[2] * k * Math.sin(a)];
+  });
+  const options = { guides: 40, iterations: 4 };
+  const job = await carried(daemon, { strands: str, source: { head }, target: { head: target }, hairline: { points: lifted(0.02) }, options });
+  assert.equal(job.targets[0].hairline.points.length, 11);
+  const document = (await expect(daemon, 200, 'GET', `/v1/grooms/${job.result.groom}`)).json;
+  assert.equal(document.retarget.hairline.edit.kind, 'front');
+  assert.ok(document.retarget.hairline.density_l1 < 0.2, JSON.stringify(document.retarget.hairline));
+  assert.ok(decode(document.retarget.strands.density).some((x) => Math.abs(x) > 0.01));
+  const now = await line_of({ groom: job.result.groom, points: 11 });
+  assert.ok(Math.abs(now.front[5][1] - today.front[5][1] - 0.02) < 0.008, `lifted by ${now.front[5][1] - today.front[5][1]}`);
+
+  const bald = await carried(daemon, { strands: str, source: { head }, target: { head: target, hairline: { kind: 'balding', points: lifted(0.05) } }, options });
+  const less = (await expect(daemon, 200, 'GET', `/v1/grooms/${bald.result.groom}`)).json;
+  assert.ok(less.strands.count < n && less.strands.count > n / 2, `${less.strands.count} of ${n}`);
+  assert.equal(less.retarget.hairline.bald, n - less.strands.count);
+  assert.equal(decode(less.retarget.strands.stretch).length, less.strands.count);
+
+  for (const [pointer, body] of [['/hairline/points', { hairline: { points: [[0, 1.7, 0]] } }], ['/target/hairline/kind', { target: { head: target, hairline: { kind: 'mullet', points: lifted(0) } } }],
+    ['/target/landmarks/1/target', { target: { head: target, landmarks: [{ source: [0, 0, 0], target: [0, 0, 0] }, { source: [0, 0, 0] }, {}, {}] } }]])
+    await refused(daemon, 400, 'invalid-argument', 'POST', '/v1/jobs', { body: { kind: 'retarget', strands: str, source: { head }, target: { head: target }, ...body }, problem: { pointer } });
+  await refused(daemon, 400, 'invalid-argument', 'POST', `/v1/heads/${target}/hairline`, { body: { strands: str, source: { head }, points: 1 }, problem: { pointer: '/points' } });
+  const off = await ended(daemon, await submit(daemon, { strands: str, source: { head }, target: { head: target }, hairline: { points: lifted(0.02).map((p, i) => (i === 4 ? [0, 2, 0] : p)) } }));
+  assert.equal(off.error.pointer, '/targets/0/hairline/points/4', JSON.stringify(off.error));
+});
+
+test('a head of other triangles is registered by landmarks', async (t) => {
+  const daemon = await startDaemon(t);
+  const str = await post_strands(daemon), head = await post_head(daemon, 'ann', [1, 1, 1], 16), other = await post_head(daemon, 'coarse', WIDE, 22);
+  const on = (d, scale) => d.map((x, k) => CENTRE[k] + RADIUS * scale[k] * x);
+  const places = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
+  const landmarks = places.map((d) => ({ source: on(d, [1, 1, 1]), target: on(d, WIDE) }));
+  const job = await carried(daemon, { strands: str, source: { head }, target: { head: other, landmarks }, options: { guides: 12 } });
+  const list = await points_of(daemon, job.result.groom);
+  outside(list, WIDE.map((x) => x * 0.98));
+  for (const strand of list) assert.ok(Math.abs(measure(strand[0], WIDE) - 1) < 0.05, `${measure(strand[0], WIDE)}`);
 });
