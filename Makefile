@@ -13,6 +13,7 @@
 #   make real-captures  fits of real captures: pictures and reports (CAPTURES names their folder)
 #   make asan tsan  the tests under AddressSanitizer and ThreadSanitizer
 #   make fuzz       libFuzzer on every parser, FUZZ_SECONDS each
+#   make docs-pictures  the pictures of the help (client/docs), by the project's own renderer
 #   make lint       include directions, cppcheck, shell and JSON syntax
 #   make install    into PREFIX (/usr/local), DESTDIR honoured
 #
@@ -65,7 +66,7 @@ PROGRAM_OF_server_groomd.c = groomd
 PROGRAM_OF_server_worker_main.c = groom-worker
 PROGRAM_OF_client_groomctl_main.c = groomctl
 
-.PHONY: all setup programs lib run test unit check-all test-service soak test-cluster test-deploy deb bench real-captures asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
+.PHONY: all setup programs lib run test unit check-all test-service soak test-cluster test-deploy docs-pictures deb bench real-captures asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
 .DEFAULT_GOAL := all
 
 all: setup
@@ -121,7 +122,14 @@ $(STUDIO): $(wildcard client/web/*.mjs client/web/index.html) $(shell find clien
 	node client/web/build.mjs $(ENGINE) $(@D)
 	@touch $@
 
+# The help: pages and pictures in one file.
+DOCS           = build/web/docs.pack
+$(DOCS): $(wildcard client/docs/*.md client/docs/docs.css client/docs/build.mjs client/docs/pictures/*) client/web/node_modules/.installed
+	@mkdir -p $(@D)
+	node client/docs/build.mjs $@
+
 # Files that are embedded (proto/embed.h).
+$(BUILD)/obj/server/http/docs.o: $(DOCS)
 $(BUILD)/obj/server/http/studio.o: $(STUDIO)
 $(BUILD)/obj/server/http/about.o: proto/openapi.json
 $(BUILD)/obj/server/http/page.o: server/http/status.css
@@ -235,6 +243,10 @@ real-captures: setup
 	+@$(SUBMAKE) $(BUILD)/tests/bench/real_captures
 	@mkdir -p $(BUILD)/real-captures
 	@$(BUILD)/tests/bench/real_captures $(CAPTURES) $(BUILD)/real-captures
+
+docs-pictures: setup
+	+@$(SUBMAKE) programs node-packages
+	@BUILD=$(BUILD) node client/docs/pictures.mjs
 
 lint:
 	@tests/lint.sh

@@ -19,6 +19,10 @@ void about_openapi(struct request *request);
 void studio_index(struct request *request);
 void studio_file(struct request *request);
 
+/* docs.c: the help */
+void docs_index(struct request *request);
+void docs_file(struct request *request);
+
 /* page.c: the status page */
 void page_index(struct request *request);
 void page_style(struct request *request);

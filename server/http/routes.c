@@ -5,6 +5,8 @@
 const struct route http_routes[] = {
     {"GET", "/", studio_index, BODY_NONE, LANE_INLINE, "", ROUTE_PUBLIC, NULL},
     {"GET", "/studio/{file}", studio_file, BODY_NONE, LANE_INLINE, "", ROUTE_PUBLIC, NULL},
+    {"GET", "/docs/", docs_index, BODY_NONE, LANE_INLINE, "", ROUTE_PUBLIC, NULL},
+    {"GET", "/docs/{file}", docs_file, BODY_NONE, LANE_INLINE, "", ROUTE_PUBLIC, NULL},
     {"GET", "/status", page_index, BODY_NONE, LANE_FAST, "", ROUTE_PUBLIC, NULL},
     {"GET", "/status.css", page_style, BODY_NONE, LANE_INLINE, "", ROUTE_PUBLIC, NULL},
     {"GET", "/grooms/{id}/quality", page_quality, BODY_NONE, LANE_SLOW, "revision with", 0, NULL},

@@ -83,6 +83,8 @@ test('every operation answers as it is described', async (t) => {
   await expect(daemon, 201, 'POST', `${groom}/revert`, { headers: { 'If-Match': '"3"' }, body: { revision: 1 } });
   await get(`${groom}/preview.png?size=64`);
   await get(`${groom}/turntable.png?size=64&frames=2`);
+  await get('/docs/');
+  await get('/docs/tutorial.html');
   await get(`${groom}/quality`);
   await get(`${groom}/quality.png?size=64&of=target`);
   await get(`/v1/strands/${strands.id}/quality?with=${done.result.groom}`);
