@@ -87,6 +87,9 @@ test('each operation has its command', { timeout: 120000 * slowness }, async (t)
   const [{ id: spare }] = await json('uploadStrands', ['upload', path('hair.hair'), '--unit', 'cm']);
   await json('removeStrands', ['delete', spare]);
 
+  /* needs a capture with a hairline: tests/api/retarget.test.mjs has one */
+  await run('headHairline', ['hairline', '--help']);
+
   /* the same for people: words, not JSON */
   for (const args of [['clusters', strands], ['audit'], ['list', 'strands'], ['analyze', strands, '--count', '10']])
     assert.doesNotMatch((await run([], args)).stdout, /^[{[]/, args.join(' '));
