@@ -24,6 +24,7 @@ enum phase { SEED, CLUSTER, GUIDES, OPERATOR_GUIDES, INSTANCE, OPERATORS, ASSIGN
 #define FEATURE_VERTICES 16        /* of a strand, where seeds are drawn */
 #define STEP_PRODUCTS 3e10         /* multiplications of K-means in a step: about half a second on two cores */
 #define LEAST_CLUSTER 4            /* strands a guide, where the number of guides is automatic */
+#define FEW_STRANDS 16             /* so many may each be their own guide: they need not be alike */
 #define GUIDES_PER_ROOT 4.0        /* guides for each square root of the number of strands */
 
 static uint32_t least(uint32_t a, uint32_t b) { return a < b ? a : b; }
@@ -33,8 +34,9 @@ static uint32_t least(uint32_t a, uint32_t b) { return a < b ? a : b; }
 static uint32_t automatic_guides(uint32_t n)
 {
     uint32_t guides = (uint32_t)(GUIDES_PER_ROOT * sqrt(n) + 0.5);
-    guides = least(guides, n / LEAST_CLUSTER);
-    return guides ? guides : 1;
+    uint32_t most = least(n, FEW_STRANDS);
+    most = n / LEAST_CLUSTER > most ? n / LEAST_CLUSTER : most;
+    return least(guides, most);
 }
 
 /* A few vertices of each strand say enough where only seeds are wanted. [n][3 * *n_vertices] */

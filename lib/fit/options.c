@@ -11,7 +11,7 @@ const struct option_row options_table[] = {
     {"/vertices", OPTION_U32, AT(vertices), ALL(100), 3, 1000,
      "Vertices of each strand and guide; the capture is resampled to it."},
     {"/guides", OPTION_U32_OR_AUTO, AT(guides), ALL(0), 1, 10000,
-     "Guide strands. auto: 4 for each square root of the number of strands, at least 4 strands a guide."},
+     "Guide strands. auto: 4 for each square root of the number of strands, at least 4 strands a guide, but where there are no more than 16."},
     {"/operator_guides", OPTION_U32_OR_AUTO, AT(operator_guides), ALL(0), 1, 10000,
      "Guides that operators work around, chosen among the guides. auto: a quarter of them."},
     {"/operators", OPTION_OPERATORS, AT(operators), ALL(0), 0, GROOM_FIT_MAX_OPERATORS,

@@ -76,6 +76,7 @@ groom_status groom_fit_report_print(const struct groom_fit *fit, char **out, str
         cJSON_AddStringToObject(json, "scalp", groom_scalp_source_name(report->scalp)) &&
         cJSON_AddNumberToObject(json, "joined", report->n_joined) &&
         cJSON_AddNumberToObject(json, "detached", report->n_detached) &&
+        cJSON_AddNumberToObject(json, "outliers", report->n_outliers) &&
         cJSON_AddNumberToObject(json, "unseen", report->n_unseen) &&
         cJSON_AddNumberToObject(json, "reassigned", report->n_reassigned) &&
         cJSON_AddNumberToObject(json, "penetrating", report->n_penetrating) && put_losses(json, report) &&

@@ -5,6 +5,8 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/progress.h"
+#include "fit/head_frame.h"
+#include "fit/outliers.h"
 #include "fit/state.h"
 #include "fit/unseen.h"
 #include "groom/strands.h"
@@ -44,29 +46,43 @@ static groom_status check_strands(const struct groom_strands *strands, struct gr
 
 /* --- sizes ------------------------------------------------------------------------- */
 
-/* The mean of n points and the root mean square distance from it; every stride-th point, in order. */
-static double spread_of(const float (*points)[3], const uint32_t *index, uint32_t n, double mean[3])
+/* Points of strands, outliers left out; first NULL: m of each. */
+struct cloud {
+    const float (*points)[3];
+    const uint32_t *first;
+    uint32_t n, m;
+    const unsigned char *outlier;
+};
+
+/* The mean of roots alone or of all points, and the root mean square distance from it. */
+static double spread_of(const struct cloud *cloud, int roots_alone, double mean[3])
 {
     double square = 0;
+    size_t count = 0;
     mean[0] = mean[1] = mean[2] = 0;
-    for (uint32_t i = 0; i < n; i++)
-        for (int c = 0; c < 3; c++)
-            mean[c] += points[index ? index[i] : i][c];
-    for (int c = 0; c < 3; c++)
-        mean[c] /= n;
-    for (uint32_t i = 0; i < n; i++)
-        for (int c = 0; c < 3; c++) {
-            double d = points[index ? index[i] : i][c] - mean[c];
-            square += d * d;
+    for (int pass = 0; pass < 2; pass++) {
+        for (uint32_t i = 0; i < cloud->n; i++) {
+            size_t begin = cloud->first ? cloud->first[i] : (size_t)i * cloud->m;
+            size_t end = roots_alone ? begin + 1 : cloud->first ? cloud->first[i + 1] : begin + cloud->m;
+            for (size_t v = begin; v < end && !cloud->outlier[i]; v++, count += pass == 0)
+                for (int c = 0; c < 3; c++) {
+                    double d = (double)cloud->points[v][c] - mean[c];
+                    if (pass == 0)
+                        mean[c] += (double)cloud->points[v][c];
+                    else
+                        square += d * d;
+                }
         }
-    return sqrt(square / n);
+        for (int c = 0; c < 3 && pass == 0; c++)
+            mean[c] /= (double)count;
+    }
+    return sqrt(square / (double)count);
 }
 
-static float ordinary_of(const struct groom_strands *strands)
+static float ordinary_of(const struct groom_strands *strands, const unsigned char *outlier)
 {
-    double mean[3];
-    double roots = spread_of((const float (*)[3])strands->points, strands->first, strands->n_strands, mean);
-    double all = spread_of((const float (*)[3])strands->points, NULL, strands->n_vertices, mean);
+    struct cloud cloud = {(const float (*)[3])strands->points, strands->first, strands->n_strands, 0, outlier};
+    double mean[3], roots = spread_of(&cloud, 1, mean), all = spread_of(&cloud, 0, mean);
     /* one place for all roots: hair is about twice as far from its middle as roots are from theirs */
     double spread = roots > 1e-3 * all ? roots : all / 2;
     return spread > 0 ? (float)(spread / ORDINARY_ROOT_SPREAD) : 1;
@@ -192,12 +208,13 @@ static void normalize_piece(void *user, uint32_t piece, uint32_t thread)
             }
 }
 
-static void normalize_target(struct groom_fit *fit, const struct groom_context *context)
+static void normalize_target(struct groom_fit *fit, const unsigned char *outlier, const struct groom_context *context)
 {
+    struct cloud cloud = {(const float (*)[3])fit->target, NULL, fit->n, fit->m, outlier};
     double mean[3], spread;
     for (uint32_t i = 0; i < fit->n; i++)
         memcpy(fit->roots[i], fit->target[(size_t)i * fit->m], sizeof fit->roots[i]);
-    spread = spread_of((const float (*)[3])fit->target, NULL, fit->n * fit->m, mean);
+    spread = spread_of(&cloud, 0, mean);
     for (int c = 0; c < 3; c++)
         fit->centre[c] = (float)mean[c];
     fit->scale = spread > 0 ? (float)spread : 1;
@@ -220,8 +237,30 @@ static int usable_uv(const struct groom_strands *strands)
     return spread;
 }
 
+/* The chart of roots that are not outliers, whose own coordinates are the nearest in it. */
+static groom_status chart_roots(struct groom_fit *fit, const unsigned char *outlier, const struct groom_context *context,
+                                struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    float (*roots)[3] = memory_array(allocator, fit->n, sizeof *roots);
+    if (!roots)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for the roots of %u strands", fit->n);
+    for (uint32_t i = 0; i < fit->n; i++)
+        for (int c = 0; c < 3; c++)
+            roots[i][c] = outlier[i] ? NAN : fit->roots[i][c]; /* not finite: left out of account */
+    groom_status st = groom_scalp_create((const float (*)[3])roots, fit->n, fit->bvh, context, &fit->scalp, diag);
+    memory_release(allocator, roots, fit->n, sizeof *roots);
+    if (st != GROOM_OK)
+        return st;
+    groom_scalp_coordinates(fit->scalp, (const float (*)[3])fit->roots, fit->n, fit->root_uv, context);
+    for (uint32_t i = 0; i < fit->n; i++)
+        for (int c = 0; c < 2 && outlier[i]; c++)
+            fit->root_uv[i][c] = fminf(fmaxf(fit->root_uv[i][c], 0), 1);
+    return GROOM_OK;
+}
+
 /* A head's chart where there is a head; else what the file brought; else a chart of the roots. */
-static groom_status place_roots(struct groom_fit *fit, const struct groom_strands *strands,
+static groom_status place_roots(struct groom_fit *fit, const struct groom_strands *strands, const unsigned char *outlier,
                                 const struct groom_context *context, struct groom_diag *diag)
 {
     groom_status st;
@@ -231,36 +270,52 @@ static groom_status place_roots(struct groom_fit *fit, const struct groom_strand
         report_note(&fit->report, "Scalp coordinates are those of the strands' file.");
         return GROOM_OK;
     }
-    st = groom_scalp_create((const float (*)[3])fit->roots, fit->n, fit->bvh, context, &fit->scalp, diag);
-    if (st != GROOM_OK)
+    if ((st = chart_roots(fit, outlier, context, diag)) != GROOM_OK)
         return st;
-    groom_scalp_coordinates(fit->scalp, (const float (*)[3])fit->roots, fit->n, fit->root_uv, context);
     fit->report.scalp = groom_scalp_source_of(fit->scalp);
     report_note(&fit->report, "%s", groom_scalp_note(fit->scalp));
     return GROOM_OK;
 }
 
-groom_status target_create(struct groom_fit *fit, const struct groom_strands *strands,
-                           const struct groom_mesh *head, const struct groom_context *context,
-                           struct groom_diag *diag)
+/* --- the target -------------------------------------------------------------------------------- */
+
+static groom_status allocate(struct groom_fit *fit, struct groom_diag *diag)
 {
-    struct groom_strands *joined = NULL;
-    groom_status st = check_strands(strands, diag);
-    if (st != GROOM_OK)
-        return st;
-    fit->n = strands->n_strands;
-    fit->m = fit->options.vertices;
-    if ((uint64_t)fit->n * fit->m > UINT32_MAX)
-        return groom_fail(diag, GROOM_ETOOBIG, "%u strands of %u vertices are more than 2^32 vertices", fit->n, fit->m);
-    fit->ordinary = ordinary_of(strands);
-    if (head && (st = groom_bvh_create(head, context, &fit->bvh, diag)) != GROOM_OK)
-        return st;
     fit->roots = memory_array(fit->allocator, fit->n, sizeof *fit->roots);
     fit->root_uv = memory_array(fit->allocator, fit->n, sizeof *fit->root_uv);
     fit->target = memory_array(fit->allocator, (size_t)fit->n * fit->m, sizeof *fit->target);
     if (!fit->roots || !fit->root_uv || !fit->target)
         return groom_fail(diag, GROOM_ENOMEM, "no memory for a target of %u strands of %u vertices", fit->n, fit->m);
-    if ((st = join_to_scalp(fit, strands, context, &joined, diag)) != GROOM_OK)
+    return GROOM_OK;
+}
+
+static groom_status index_head(struct groom_fit *fit, const struct groom_strands *strands, const struct groom_mesh *head,
+                               const unsigned char *outlier, const struct groom_context *context, struct groom_diag *diag)
+{
+    groom_status st = head ? groom_bvh_create(head, context, &fit->bvh, diag) : GROOM_OK;
+    if (st != GROOM_OK || !head)
+        return st;
+    return head_frame_check(fit->bvh, strands, outlier, (float)JOIN_MOST * fit->ordinary, diag);
+}
+
+static void note_joins(struct groom_fit *fit)
+{
+    struct groom_fit_report *report = &fit->report;
+    if (report->n_joined)
+        report_note(report, "%u strands started off the scalp and were joined to it.", report->n_joined);
+    if (report->n_detached)
+        report_note(report, "%u strands start too far from the head to be joined to it.", report->n_detached);
+    if (report->n_detached > fit->n / 2)
+        report_note(report, "Most strands start more than %.0f mm from the head: is it the head of this hair, in its place?",
+                    1000 * JOIN_MOST * (double)fit->ordinary);
+}
+
+static groom_status fill_target(struct groom_fit *fit, const struct groom_strands *strands, const unsigned char *outlier,
+                                const struct groom_context *context, struct groom_diag *diag)
+{
+    struct groom_strands *joined = NULL;
+    groom_status st = join_to_scalp(fit, strands, context, &joined, diag);
+    if (st != GROOM_OK)
         return st;
     st = groom_strands_resample(joined, fit->m, fit->target, context, diag);
     groom_strands_destroy(joined);
@@ -268,12 +323,35 @@ groom_status target_create(struct groom_fit *fit, const struct groom_strands *st
         return st;
     if (progress_cancelled(context))
         return groom_fail(diag, GROOM_ECANCELLED, "cancelled while the target was prepared");
-    normalize_target(fit, context);
-    if (fit->report.n_joined)
-        report_note(&fit->report, "%u strands started off the scalp and were joined to it.", fit->report.n_joined);
-    if (fit->report.n_detached)
-        report_note(&fit->report, "%u strands start too far from the head to be joined to it.", fit->report.n_detached);
-    if ((st = place_roots(fit, strands, context, diag)) != GROOM_OK)
+    normalize_target(fit, outlier, context);
+    note_joins(fit);
+    return GROOM_OK;
+}
+
+groom_status target_create(struct groom_fit *fit, const struct groom_strands *strands,
+                           const struct groom_mesh *head, const struct groom_context *context,
+                           struct groom_diag *diag)
+{
+    unsigned char *outlier;
+    groom_status st = check_strands(strands, diag);
+    if (st != GROOM_OK)
         return st;
-    return unseen_remove(fit, context, diag);
+    fit->n = strands->n_strands;
+    fit->m = fit->options.vertices;
+    if ((uint64_t)fit->n * fit->m > UINT32_MAX)
+        return groom_fail(diag, GROOM_ETOOBIG, "%u strands of %u vertices are more than 2^32 vertices", fit->n, fit->m);
+    if (!(outlier = memory_array(memory_allocator(context), strands->n_strands, 1)))
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to look at %u strands", fit->n);
+    if ((st = outliers_find(strands, context, outlier, &fit->report.n_outliers, diag)) != GROOM_OK)
+        goto out;
+    fit->ordinary = ordinary_of(strands, outlier);
+    if ((st = index_head(fit, strands, head, outlier, context, diag)) != GROOM_OK ||
+        (st = allocate(fit, diag)) != GROOM_OK ||
+        (st = fill_target(fit, strands, outlier, context, diag)) != GROOM_OK ||
+        (st = place_roots(fit, strands, outlier, context, diag)) != GROOM_OK)
+        goto out;
+    st = unseen_remove(fit, outlier, context, diag);
+out:
+    memory_release(memory_allocator(context), outlier, strands->n_strands, 1);
+    return st;
 }

@@ -40,46 +40,76 @@ static groom_status compact(struct groom_fit *fit, uint32_t n_seen, struct groom
     return GROOM_OK;
 }
 
-static groom_status list_seen(struct groom_fit *fit, const float *share, struct groom_diag *diag)
+static void report_unseen(struct groom_fit *fit, const float *share)
 {
     uint32_t n_seen = 0;
     for (uint32_t i = 0; i < fit->n; i++)
         n_seen += share[i] > 0 && share[i] >= (float)fit->options.least_seen;
-    fit->report.n_unseen = fit->n - n_seen;
-    if (n_seen == 0) {
+    fit->report.n_unseen = n_seen > 0 ? fit->n - n_seen : 0;
+    if (n_seen == 0)
         report_note(&fit->report, "No camera sees any strand, so that all are used: are cameras and strands in one frame?");
-        fit->report.n_unseen = 0;
-        return GROOM_OK;
-    }
-    report_note(&fit->report, "%u of %u strands are seen by no camera and left out of the fit.", fit->n - n_seen, fit->n);
-    if (n_seen == fit->n)
-        return GROOM_OK;
-    if (!(fit->all.seen = memory_array(fit->allocator, fit->n, sizeof *fit->all.seen)))
-        return groom_fail(diag, GROOM_ENOMEM, "no memory to list the strands that cameras see");
-    fit->all.n = fit->n;
-    n_seen = 0;
-    for (uint32_t i = 0; i < fit->n; i++)
-        if (share[i] > 0 && share[i] >= (float)fit->options.least_seen)
-            fit->all.seen[n_seen++] = i;
-    return compact(fit, n_seen, diag);
+    else
+        report_note(&fit->report, "%u of %u strands are seen by no camera and left out of the fit.", fit->n - n_seen, fit->n);
 }
 
-groom_status unseen_remove(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+/* Marks strands of which cameras see too little as left out. */
+static groom_status mark_unseen(struct groom_fit *fit, unsigned char *left_out, const struct groom_context *context,
+                                struct groom_diag *diag)
 {
     struct visibility_scene scene = {.points = (const float (*)[3])fit->target, .scale = fit->scale, .n = fit->n, .m = fit->m,
                                      .head = fit->bvh ? groom_bvh_mesh(fit->bvh) : NULL, .ordinary = fit->ordinary};
     const struct groom_allocator *allocator = memory_allocator(context);
-    uint32_t n = fit->n;
-    if (fit->options.n_cameras == 0)
-        return GROOM_OK;
-    float *share = memory_array(allocator, n, sizeof *share);
+    float *share = memory_array(allocator, fit->n, sizeof *share);
     if (!share)
-        return groom_fail(diag, GROOM_ENOMEM, "no memory to look at %u strands", n);
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to look at %u strands", fit->n);
     memcpy(scene.centre, fit->centre, sizeof scene.centre);
     groom_status st = visibility_shares(&scene, fit->options.cameras, fit->options.n_cameras, share, context, diag);
+    if (st == GROOM_OK) {
+        report_unseen(fit, share);
+        for (uint32_t i = 0; i < fit->n && fit->report.n_unseen > 0; i++)
+            left_out[i] |= !(share[i] > 0 && share[i] >= (float)fit->options.least_seen);
+    }
+    memory_release(allocator, share, fit->n, sizeof *share);
+    return st;
+}
+
+static groom_status keep_others(struct groom_fit *fit, const unsigned char *left_out, struct groom_diag *diag)
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < fit->n; i++)
+        n += !left_out[i];
+    if (n == fit->n || n == 0)
+        return GROOM_OK;
+    if (!(fit->all.seen = memory_array(fit->allocator, fit->n, sizeof *fit->all.seen)))
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to list the strands that cameras see");
+    fit->all.n = fit->n;
+    n = 0;
+    for (uint32_t i = 0; i < fit->n; i++)
+        if (!left_out[i])
+            fit->all.seen[n++] = i;
+    return compact(fit, n, diag);
+}
+
+groom_status unseen_remove(struct groom_fit *fit, const unsigned char *outlier, const struct groom_context *context,
+                           struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    uint32_t n = fit->n;
+    unsigned char *left_out;
+    groom_status st = GROOM_OK;
+    if (fit->report.n_outliers > 0)
+        report_note(&fit->report, "Left out of the fit, as they start or reach too far from the others to be hair of one head: %u strands.",
+                    fit->report.n_outliers);
+    if (fit->options.n_cameras == 0 && fit->report.n_outliers == 0)
+        return GROOM_OK;
+    if (!(left_out = memory_array(allocator, n, 1)))
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to look at %u strands", n);
+    memcpy(left_out, outlier, n);
+    if (fit->options.n_cameras > 0)
+        st = mark_unseen(fit, left_out, context, diag);
     if (st == GROOM_OK)
-        st = list_seen(fit, share, diag);
-    memory_release(allocator, share, n, sizeof *share);
+        st = keep_others(fit, left_out, diag);
+    memory_release(allocator, left_out, n, 1);
     return st;
 }
 

@@ -1,13 +1,15 @@
-/* Strands that no camera sees: taken out of the target, put back into the groom. */
+/* Strands that no camera sees, and outliers: taken out of the target, put back into the groom. */
 #ifndef FIT_UNSEEN_H
 #define FIT_UNSEEN_H
 
 #include "fit/state.h"
 
-/* Leaves the target with the strands that are seen: their order stays, n becomes their number, and
- * fit->all knows the others. All stay where there is no camera, or no camera sees anything.
+/* Leaves the target with the strands that are seen and are no outliers: their order stays, n becomes their number,
+ * and fit->all knows the others. Where there is no camera, or no camera sees anything, all are seen.
+ * outlier  [n] 0 or 1
  * returns  GROOM_OK, GROOM_ENOMEM, GROOM_ECANCELLED */
-GROOM_MUST_CHECK groom_status unseen_remove(struct groom_fit *fit, const struct groom_context *context,
+GROOM_MUST_CHECK groom_status unseen_remove(struct groom_fit *fit, const unsigned char *outlier,
+                                            const struct groom_context *context,
                                             struct groom_diag *diag);
 
 /* A groom of all strands: those that are seen as the fit has them, the others instanced by distance, with

@@ -150,7 +150,7 @@ struct groom_fit;
  * options  copied
  * context  its allocator must live as long as the fit
  * returns  GROOM_OK, GROOM_EINVAL (a strand of fewer than 2 vertices or with a value that is not
- *          finite), GROOM_EEMPTY (no strands), GROOM_ENOMEM, GROOM_ECANCELLED */
+ *          finite; a head that would meet the strands in another unit or axis alone), GROOM_EEMPTY (no strands), GROOM_ENOMEM, GROOM_ECANCELLED */
 GROOM_MUST_CHECK groom_status groom_fit_create(const struct groom_strands *strands,
                                                const struct groom_mesh *head,
                                                const struct groom_fit_options *options,
@@ -209,6 +209,7 @@ struct groom_fit_report {
     groom_scalp_source scalp;
     uint32_t n_joined;      /* strands that started off the scalp and were joined to it */
     uint32_t n_detached;    /* that start too far from it and were left as they are */
+    uint32_t n_outliers;    /* that start or reach too far from the others: left out of the stages */
     uint32_t n_unseen;      /* that no camera sees enough of: left out of the stages */
     uint32_t n_reassigned;  /* moved to another operator guide, away from the head */
     uint32_t n_penetrating; /* for which no operator guide keeps them out of the head */
