@@ -7,6 +7,7 @@
 #include "base/progress.h"
 #include "fit/head_frame.h"
 #include "fit/outliers.h"
+#include "fit/refine.h"
 #include "fit/state.h"
 #include "fit/unseen.h"
 #include "groom/strands.h"
@@ -313,12 +314,13 @@ static void note_joins(struct groom_fit *fit)
 static groom_status fill_target(struct groom_fit *fit, const struct groom_strands *strands, const unsigned char *outlier,
                                 const struct groom_context *context, struct groom_diag *diag)
 {
-    struct groom_strands *joined = NULL;
-    groom_status st = join_to_scalp(fit, strands, context, &joined, diag);
-    if (st != GROOM_OK)
-        return st;
-    st = groom_strands_resample(joined, fit->m, fit->target, context, diag);
+    struct groom_strands *joined = NULL, *refined = NULL;
+    groom_status st;
+    if ((st = join_to_scalp(fit, strands, context, &joined, diag)) == GROOM_OK &&
+        (st = refine_strands(joined, fit->m, context, &refined, diag)) == GROOM_OK)
+        st = groom_strands_resample(refined, fit->m, fit->target, context, diag);
     groom_strands_destroy(joined);
+    groom_strands_destroy(refined);
     if (st != GROOM_OK)
         return st;
     if (progress_cancelled(context))

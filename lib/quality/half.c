@@ -50,21 +50,39 @@ static double torsion_at(const double before[3], const double here[3], const dou
     return length > 0 && (sine != 0 || cosine != 0) ? atan2(sine, cosine) / length : 0;
 }
 
-static void measure_strand(struct quality_half *half, uint32_t i)
+/* Vertex j of m_bend of strand i: between two of its m, where these are more. */
+static void bend_vertex(const struct quality_half *half, uint32_t i, uint32_t j, float out[3])
 {
     uint32_t m = half->set.m;
-    const float (*x)[3] = (const float (*)[3])(half->set.points + (size_t)i * m);
+    double at = (double)j * (m - 1) / (half->m_bend - 1);
+    uint32_t k = at < m - 2 ? (uint32_t)at : m - 2;
+    const float *a = half->set.points[(size_t)i * m + k], *b = a + 3;
+    for (int c = 0; c < 3; c++)
+        out[c] = at - k == 0 ? a[c] : (float)((double)a[c] + (at - k) * ((double)b[c] - a[c]));
+}
+
+static void bend_segment(const struct quality_half *half, uint32_t i, uint32_t j, double out[3])
+{
+    float a[3], b[3];
+    bend_vertex(half, i, j, a);
+    bend_vertex(half, i, j + 1, b);
+    difference(a, b, out);
+}
+
+static void measure_strand(struct quality_half *half, uint32_t i)
+{
+    uint32_t m = half->m_bend;
     double segment[3][3];
     half->length[i] = (float)(half->set.start[i + 1] - half->set.start[i]);
-    difference(x[0], x[1], segment[1]);
-    difference(x[1], x[2], segment[2]);
+    bend_segment(half, i, 0, segment[1]);
+    bend_segment(half, i, 1, segment[2]);
     for (uint32_t j = 1; j + 1 < m; j++) {
         half->curvature[(size_t)i * (m - 2) + j - 1] = (float)curvature_at(segment[1], segment[2]);
         if (j + 2 == m)
             break;
         memcpy(segment[0], segment[1], sizeof segment[0]);
         memcpy(segment[1], segment[2], sizeof segment[1]);
-        difference(x[j + 1], x[j + 2], segment[2]);
+        bend_segment(half, i, j + 1, segment[2]);
         half->torsion[(size_t)i * (m - 3) + j - 1] = (float)torsion_at(segment[0], segment[1], segment[2]);
     }
 }
@@ -79,7 +97,7 @@ static void measure_piece(void *user, uint32_t piece, uint32_t thread)
 }
 
 groom_status quality_half_init(struct quality_half *half, const struct quality_set *from, const uint32_t *strand, uint32_t n,
-                               const struct groom_context *context, struct groom_diag *diag)
+                               uint32_t m_bend, const struct groom_context *context, struct groom_diag *diag)
 {
     float *spare;
     memset(half, 0, sizeof *half);
@@ -87,8 +105,9 @@ groom_status quality_half_init(struct quality_half *half, const struct quality_s
     if (st != GROOM_OK)
         return st;
     const struct groom_allocator *allocator = half->set.allocator;
-    half->n_curvatures = n * (from->m - 2);
-    half->n_torsions = n * (from->m - 3);
+    half->m_bend = m_bend;
+    half->n_curvatures = n * (m_bend - 2);
+    half->n_torsions = n * (m_bend - 3);
     half->curvature = memory_array(allocator, half->n_curvatures, sizeof *half->curvature);
     half->torsion = memory_array(allocator, half->n_torsions, sizeof *half->torsion);
     half->length = memory_array(allocator, n, sizeof *half->length);

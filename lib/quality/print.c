@@ -121,7 +121,8 @@ static int put_counts(cJSON *json, const struct groom_quality *quality)
 {
     cJSON *item = cJSON_AddObjectToObject(json, "strands");
     return item && put(item, "target", quality->n_target) && put(item, "groom", quality->n_groom) &&
-           put(item, "target_length", quality->length_target) && put(item, "groom_length", quality->length_groom);
+           put(item, "target_length", quality->length_target) && put(item, "groom_length", quality->length_groom) &&
+           put(item, "bend_vertices", quality->bend_vertices);
 }
 
 groom_status groom_quality_print(const struct groom_quality *fitted, const struct groom_quality *drawn, char **out,

@@ -24,6 +24,7 @@ struct groom_quality_target {
     const struct groom_allocator *allocator;
     struct groom_quality_options options; /* defaults filled in */
     struct quality_set set;
+    uint32_t m_bend;        /* vertices at which curvature and torsion are looked at */
     struct groom_bvh *head; /* or NULL */
     struct groom_quality_head inside;
     struct half_distances floor;    /* of the largest halves */
@@ -60,7 +61,7 @@ static void halves_finish(struct halves *halves)
 }
 
 /* Two halves of k strands each, 2 k <= n. Finish them in any case. */
-static groom_status halves_init(struct halves *halves, const struct quality_set *set, uint32_t k, uint64_t seed,
+static groom_status halves_init(struct halves *halves, const struct quality_set *set, uint32_t k, uint32_t m_bend, uint64_t seed,
                                 const struct groom_context *context, struct groom_diag *diag)
 {
     uint32_t *order = NULL;
@@ -68,8 +69,8 @@ static groom_status halves_init(struct halves *halves, const struct quality_set 
     groom_status st = draw_order(set->n, seed, context, &order, diag);
     if (st != GROOM_OK)
         return st;
-    if ((st = quality_half_init(&halves->a, set, order, k, context, diag)) == GROOM_OK)
-        st = quality_half_init(&halves->b, set, order + set->n / 2, k, context, diag);
+    if ((st = quality_half_init(&halves->a, set, order, k, m_bend, context, diag)) == GROOM_OK)
+        st = quality_half_init(&halves->b, set, order + set->n / 2, k, m_bend, context, diag);
     memory_release(memory_allocator(context), order, set->n, sizeof *order);
     return st;
 }
@@ -116,8 +117,8 @@ static groom_status compare_distributions(const struct groom_quality_target *tar
     struct half_distances distances, floor = target->floor;
     struct halves of_target = {0}, of_groom = {0};
     groom_status st;
-    if ((st = halves_init(&of_target, &target->set, k, seed, context, diag)) != GROOM_OK ||
-        (st = halves_init(&of_groom, groom, k, seed, context, diag)) != GROOM_OK ||
+    if ((st = halves_init(&of_target, &target->set, k, target->m_bend, seed, context, diag)) != GROOM_OK ||
+        (st = halves_init(&of_groom, groom, k, target->m_bend, seed, context, diag)) != GROOM_OK ||
         (st = compare_across(&of_target, &of_groom, seed, &distances, context, diag)) != GROOM_OK)
         goto out;
     if (k < most_in_half(target, target->set.n) &&
@@ -269,7 +270,8 @@ static groom_status measure_floor(struct groom_quality_target *target, const str
 {
     struct halves halves;
     uint64_t seed = target->options.seed;
-    groom_status st = halves_init(&halves, &target->set, most_in_half(target, target->set.n), seed, context, diag);
+    groom_status st = halves_init(&halves, &target->set, most_in_half(target, target->set.n), target->m_bend, seed, context,
+                                  diag);
     if (st == GROOM_OK)
         st = quality_half_compare(&halves.a, &halves.b, seed, context, &target->floor, diag);
     halves_finish(&halves);
@@ -283,6 +285,23 @@ static groom_status fill_options(const struct groom_quality_options *options, st
     out->vertices = out->vertices ? out->vertices : DEFAULT_VERTICES;
     out->strands = out->strands ? out->strands : DEFAULT_STRANDS;
     return out->vertices >= 4 ? GROOM_OK : groom_fail(diag, GROOM_EINVAL, "%u vertices a strand are too few: 4 are the least", out->vertices);
+}
+
+/* The vertices that half of the strands have no more than: a polyline of few looked at more closely than it was made
+ * is straight but for its corners, which no curve resembles. Within 4 .. `most`. */
+static groom_status choose_bend(const struct groom_strands *strands, uint32_t most, const struct groom_context *context,
+                                uint32_t *m_bend, struct groom_diag *diag)
+{
+    uint32_t *having = memory_array_zero(memory_allocator(context), (size_t)most + 1, sizeof *having), sum = 0, m = 0;
+    if (!having)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for a comparison");
+    for (uint32_t i = 0; i < strands->n_strands; i++)
+        having[least(strands->first[i + 1] - strands->first[i], most)]++;
+    while (m < most && (sum += having[m]) < (strands->n_strands + 1) / 2)
+        m++;
+    memory_release(memory_allocator(context), having, (size_t)most + 1, sizeof *having);
+    *m_bend = m > 4 ? m : 4;
+    return GROOM_OK;
 }
 
 /* Places nearer to each other than that tell the same. */
@@ -304,6 +323,7 @@ groom_status groom_quality_target_create(const struct groom_strands *strands, co
     target->allocator = allocator;
     if ((st = fill_options(options, &target->options, diag)) != GROOM_OK ||
         (st = quality_set_init(&target->set, strands, target->options.vertices, context, diag)) != GROOM_OK ||
+        (st = choose_bend(strands, target->options.vertices, context, &target->m_bend, diag)) != GROOM_OK ||
         (st = measure_floor(target, context, diag)) != GROOM_OK)
         goto out;
     target->options.places = target->options.places ? target->options.places : places_for(&target->set);
@@ -334,7 +354,8 @@ groom_status groom_quality_compare(const struct groom_quality_target *target, co
                                    const struct groom_context *context, struct groom_quality *quality,
                                    struct groom_diag *diag)
 {
-    struct groom_quality found = {.n_target = target->set.n, .n_groom = strands->n_strands};
+    struct groom_quality found = {.n_target = target->set.n, .n_groom = strands->n_strands,
+                                  .bend_vertices = target->m_bend};
     struct quality_set groom;
     groom_status st;
     if ((st = quality_set_init(&groom, strands, target->options.vertices, context, diag)) != GROOM_OK ||

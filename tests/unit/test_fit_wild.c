@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fit/refine.h"
 #include "groom/mesh.h"
 #include "groom/strands.h"
 #include "tests/support/guides.h"
@@ -163,6 +164,59 @@ START_TEST(a_head_that_is_elsewhere_is_told)
 }
 END_TEST
 
+/* --- strands of few vertices ------------------------------------------------------------------------ */
+
+/* A strand of n vertices that turns by `turn` at each, now one way, now the other where it zigzags; else a circle's. */
+static struct groom_strands *turning(uint32_t n, double turn, int zigzag)
+{
+    struct groom_strands *strands;
+    double angle = 0, x = 0, y = 0;
+    ck_ok(groom_strands_create(1, n, NULL, &strands, NULL));
+    strands->first[1] = n;
+    for (uint32_t j = 0; j < n; j++) {
+        memcpy(strands->points[j], (float[]){(float)x, (float)y, 0}, sizeof strands->points[j]);
+        x += 0.02 * cos(angle);
+        y += 0.02 * sin(angle);
+        angle += zigzag && j % 2 ? -turn : turn;
+    }
+    return strands;
+}
+
+START_TEST(few_vertices_become_the_curve_that_they_lie_on)
+{
+    const double turn = 0.3, radius = 0.01 / sin(turn / 2);
+    struct groom_strands *strands = turning(12, turn, 0), *refined;
+    double worst = 0, middle[2] = {-radius * sin(-turn / 2), radius * cos(turn / 2)};
+    ck_ok(refine_strands(strands, 100, NULL, &refined, NULL));
+    ck_assert_uint_ge(refined->n_vertices, 200);
+    for (uint32_t v = 0; v < refined->n_vertices; v++) {
+        double x = refined->points[v][0] - middle[0], y = refined->points[v][1] - middle[1];
+        int inner = v > refined->n_vertices / 11 && v < refined->n_vertices - refined->n_vertices / 11;
+        worst = inner ? fmax(worst, fabs(sqrt(x * x + y * y) - radius)) : worst;
+    }
+    ck_assert_double_lt(worst, 0.02 * radius * (1 - cos(turn / 2))); /* of what chords are off */
+    for (uint32_t j = 0; j < 12; j++)
+        ck_assert_mem_eq(refined->points[j * ((refined->n_vertices - 1) / 11)], strands->points[j], sizeof strands->points[j]);
+    groom_strands_destroy(refined);
+    groom_strands_destroy(strands);
+}
+END_TEST
+
+START_TEST(crimps_and_strands_of_many_vertices_stay_as_they_are)
+{
+    struct groom_strands *crimped = turning(21, 1.2, 1), *fine = turning(100, 0.3, 0), *refined;
+    ck_ok(refine_strands(crimped, 100, NULL, &refined, NULL));
+    ck_assert_double_eq_tol(groom_polyline_length((const float (*)[3])refined->points, refined->n_vertices), 0.4, 1e-5);
+    groom_strands_destroy(refined);
+    ck_ok(refine_strands(fine, 100, NULL, &refined, NULL));
+    ck_assert_uint_eq(refined->n_vertices, 100);
+    ck_assert_mem_eq(refined->points, fine->points, 100 * sizeof *fine->points);
+    groom_strands_destroy(refined);
+    groom_strands_destroy(crimped);
+    groom_strands_destroy(fine);
+}
+END_TEST
+
 /* --- odd strands ------------------------------------------------------------------------------------ */
 
 /* A few strands need not be alike: each is its own guide. */
@@ -232,4 +286,5 @@ END_TEST
 
 TEST_SUITE("fit_wild", strands_from_elsewhere_change_nothing_for_the_others, many_that_are_far_are_no_outliers,
            a_head_in_another_unit_is_refused, a_head_with_another_axis_up_is_refused, a_head_that_is_elsewhere_is_told,
-           few_strands_keep_their_places, odd_strands_are_survived)
+           few_vertices_become_the_curve_that_they_lie_on,
+           crimps_and_strands_of_many_vertices_stay_as_they_are, few_strands_keep_their_places, odd_strands_are_survived)

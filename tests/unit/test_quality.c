@@ -212,6 +212,25 @@ START_TEST(curvature_and_torsion_are_those_of_a_helix)
 }
 END_TEST
 
+/* A quarter of a circle of 0.1 m; of nine vertices it is eight straight pieces, which are curved all the same. */
+static void arc(uint32_t i, double t, double p[3])
+{
+    p[0] = 0.02 * i + 0.1 * cos(90 * DEGREE * t);
+    p[1] = -0.1 * sin(90 * DEGREE * t);
+    p[2] = 0.01 * i;
+}
+
+START_TEST(curvature_is_looked_at_as_closely_as_the_target_was_made)
+{
+    struct groom_quality q = compare(make(32, 9, arc), make(32, 300, arc));
+    ck_assert_uint_eq(q.bend_vertices, 9);
+    ck_assert_double_le(q.curvature.distance, 0.03 * 10);
+    q = compare(make(32, 300, arc), make(32, 9, line));
+    ck_assert_uint_eq(q.bend_vertices, 100);
+    ck_assert_double_eq_tol(q.curvature.distance, 10, 0.1);
+}
+END_TEST
+
 START_TEST(histograms_hold_most_values)
 {
     struct groom_quality q = compare(make(32, 2000, helix), make(32, 2000, helix));
@@ -452,7 +471,8 @@ END_TEST
 TEST_SUITE("quality", a_set_is_like_itself, a_shift_shows_as_its_distance, vertex_counts_do_not_matter,
            direction_counts_from_root_to_tip, an_angle_passes_the_tolerances_above_it,
            precision_and_recall_tell_which_has_more, the_nearest_segment_alone_is_the_stricter_reading,
-           length_is_compared_in_metres, curvature_and_torsion_are_those_of_a_helix, histograms_hold_most_values,
+           length_is_compared_in_metres, curvature_and_torsion_are_those_of_a_helix,
+           curvature_is_looked_at_as_closely_as_the_target_was_made, histograms_hold_most_values,
            the_truth_with_other_random_numbers_scores_its_floor, strands_in_the_head_are_counted,
            the_grid_finds_what_looking_at_all_segments_finds, the_bits_do_not_depend_on_threads,
            what_cannot_be_compared_is_refused, no_failing_allocation_leaks)

@@ -76,6 +76,7 @@ struct groom_quality_head {
 
 struct groom_quality {
     uint32_t n_target, n_groom;       /* strands */
+    uint32_t bend_vertices;    /* of each strand at which curvature and torsion were looked at */
     double length_target, length_groom; /* metres of all strands together */
     struct groom_quality_distance spectra, segments, curvature, torsion, length;
     struct groom_quality_nearest to_target, to_groom, floor; /* from the groom's places, from the target's, A and B */
