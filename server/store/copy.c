@@ -6,7 +6,7 @@
 
 #include "server/store/database.h"
 
-#define PAGES_A_STEP 2000
+int database_copy_pages = 2000;
 
 /* --- copying ------------------------------------------------------------------------------ */
 
@@ -20,15 +20,19 @@ static groom_status open_copy(const char *path, int flags, sqlite3 **db, struct 
                             diag);
 }
 
-/* All pages of `from`, as they are in its present read transaction. */
+/* All pages of `from`, as they are in its present read transaction. That begins with something read: else each
+ * step would see a state of its own, and begin again from the first page whenever others have written meanwhile. */
 static groom_status copy_pages(sqlite3 *from, sqlite3 *to, struct groom_diag *diag)
 {
+    groom_status status = database_execute(from, "SELECT count(*) FROM sqlite_schema", diag);
+    if (status != GROOM_OK)
+        return status;
     sqlite3_backup *backup = sqlite3_backup_init(to, "main", from, "main");
     if (!backup)
         return database_fail(to, sqlite3_errcode(to), diag);
     int code;
     do
-        code = sqlite3_backup_step(backup, PAGES_A_STEP);
+        code = sqlite3_backup_step(backup, database_copy_pages);
     while (code == SQLITE_OK);
     sqlite3_backup_finish(backup);
     return code == SQLITE_DONE ? GROOM_OK : database_fail(to, code, diag);

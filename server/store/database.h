@@ -114,6 +114,8 @@ extern const int schema_version;
 
 /* --- copies (copy.c) ------------------------------------------------------------------------- */
 
+/* How many pages are copied at a time; a test says fewer. */
+extern int database_copy_pages;
 /* A copy as a store with its writer alone, brought to the present schema. */
 GROOM_MUST_CHECK groom_status database_open_copy(const char *path, struct store *store, struct groom_diag *diag);
 void database_close_copy(struct store *store);

@@ -1154,6 +1154,61 @@ START_TEST(readers_cannot_write_or_checkpoint)
 }
 END_TEST
 
+/* --- copies while others write --------------------------------------------------------------------- */
+
+#define MOST_WRITES 3000
+
+struct writing {
+    struct store *store;
+    _Atomic int n, stop;
+};
+
+static void *write_on(void *user)
+{
+    struct writing *writing = user;
+    char id[STORE_ID_SIZE];
+    while (!writing->stop && writing->n < MOST_WRITES) {
+        snprintf(id, sizeof id, "job_%d", writing->n);
+        make_job(writing->store, id, 0);
+        writing->n++;
+    }
+    return NULL;
+}
+
+/* It takes longer than the writes between its steps: it must not begin again with each of them. */
+START_TEST(a_copy_is_one_state_and_ends_though_others_write)
+{
+    struct writing writing = {.store = open_new()};
+    struct store_counts before, copied;
+    struct store *copy;
+    pthread_t thread;
+    char *large = calloc(1, 16 << 20);
+    struct store_array array = {.sha256 = HASH_B, .bytes = large, .n_bytes = 16 << 20};
+    struct store_revision_new revision = first_revision;
+    revision.arrays = &array;
+    database_copy_pages = 1;
+    ck_ok(database_execute(writing.store->writer.db, "PRAGMA synchronous = OFF", &diag)); /* many writes, quickly */
+    ck_ok(store_groom_create(writing.store, &revision, &diag));
+    ck_assert_int_eq(pthread_create(&thread, NULL, write_on, &writing), 0);
+    while (writing.n < 3)
+        sched_yield();
+    ck_ok(store_count(writing.store, &before, &diag));
+    ck_ok(store_copy(writing.store, test_folder_path("copy.db"), &diag));
+    int n_meanwhile = writing.n;
+    writing.stop = 1;
+    pthread_join(thread, NULL);
+    ck_assert_int_lt(n_meanwhile, MOST_WRITES); /* it has not waited for a quiet moment */
+    ck_ok(store_open(test_folder_path("copy.db"), &copy, &diag));
+    ck_ok(store_count(copy, &copied, &diag));
+    ck_assert_uint_ge(copied.jobs[STORE_JOB_QUEUED], before.jobs[STORE_JOB_QUEUED]);
+    ck_assert_uint_le(copied.jobs[STORE_JOB_QUEUED], (uint64_t)n_meanwhile + 1);
+    store_close(copy);
+    free(large);
+    database_copy_pages = 2000;
+    close_all(writing.store);
+}
+END_TEST
+
 /* --- a full disk -------------------------------------------------------------------------------------- */
 
 START_TEST(a_full_database_says_so_and_goes_on)
@@ -1190,5 +1245,5 @@ TEST_SUITE("store", the_first_schema_becomes_the_present_one, a_look_waits_for_n
            a_back_off_holds_a_job_back, a_checkpoint_replaces_the_one_before_and_goes_with_the_job,
            events_are_numbered_without_gaps, a_loss_that_is_reported_again_is_kept_once,
            progress_leaves_alone_what_it_does_not_name, no_job_is_taken_twice,
-           what_was_acknowledged_survives_a_kill,
+           what_was_acknowledged_survives_a_kill, a_copy_is_one_state_and_ends_though_others_write,
            a_full_database_says_so_and_goes_on)
