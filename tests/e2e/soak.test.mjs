@@ -30,6 +30,7 @@ test(`${seconds} s of a steady mixture leave memory and descriptors flat`, { tim
   const daemon = await startDaemon(t, { args: ['--workers', '1', '--worker-threads', '1', '--log-level', 'error', '--idle-timeout', '5', '--export-cache', '20M'] });
   const workload = new Workload(daemon, 5), start = Date.now(), tenths = Array.from({ length: 10 }, () => []);
   const now_s = () => (Date.now() - start) / 1000;
+  workload.max_waiting = 10;
   workload.start(2, Math.max(20, seconds * 2), pace_ms * 0.8);
   for (let i = 0, told = 0; now_s() < seconds; i++) {
     await visit(workload, workload.next);

@@ -24,7 +24,7 @@ const end_states = new Set(['succeeded', 'failed', 'cancelled']);
 
 export class Workload {
   constructor(daemon, seed) {
-    Object.assign(this, { daemon, next: random(seed), seed, running: false, clients: [], uploads: [], jobs: new Map(), grooms: new Map(), events: new Map(), refusals: [], sent: 0, n_told: 0 });
+    Object.assign(this, { daemon, next: random(seed), seed, running: false, clients: [], uploads: [], jobs: new Map(), grooms: new Map(), events: new Map(), refusals: [], sent: 0, n_told: 0, max_waiting: Infinity, n_waiting: 0, newest: null });
   }
 
   /** One call; null where the line broke: then nobody was told anything. */
@@ -55,16 +55,27 @@ export class Workload {
     this.uploads.push({ id: client.strands, sha256: sha256(bytes) });
   }
 
+  /** Are fewer than max_waiting jobs before the newest? A queue that grows is no steady state. */
+  async has_room() {
+    if (this.n_waiting < this.max_waiting) return true;
+    const job = await this.ask('GET', `/v1/jobs/${this.newest}`);
+    if (this.told(job, [200], 'look')) this.n_waiting = job.json().queue_position ?? 0;
+    return this.n_waiting < this.max_waiting;
+  }
+
   /** With a key: asked again until there is an answer, it is one job all the same. */
   async submit(client) {
-    if (!client.strands || this.jobs.size > client.limit) return;
+    if (!client.strands || this.jobs.size > client.limit || !await this.has_room()) return;
     const key = client.key ?? `${this.seed}-${client.name}-${client.n++}`;
     client.key = key;
     const body = client.body ?? JSON.stringify({ kind: 'fit', strands: client.strands, options: smallest });
     client.body = body;
     const answer = await this.ask('POST', '/v1/jobs', { body, headers: { 'Content-Type': 'application/json', 'Idempotency-Key': key } });
     if (!this.told(answer, [200, 202], 'submit')) return;
-    this.jobs.set(answer.json().id, key);
+    const job = answer.json();
+    this.jobs.set(job.id, key);
+    this.newest = job.id;
+    this.n_waiting = job.queue_position ?? 0;
     client.key = client.body = null;
   }
 
