@@ -224,6 +224,7 @@ static groom_status prepare_document(struct grooms *grooms, const struct store_j
     groom_status status = groom_document_read(part->bytes, part->n_bytes, NULL, &grooms->context, &groom, diag);
     if (status == GROOM_OK) {
         snprintf(groom->name, sizeof groom->name, "%s", part->name);
+        groom->base_strands[0] = 0; /* a base that was carried is nobody's upload any more */
         status = prepare_groom(grooms, groom, around, strlen(around), &source, &made->prepared[made->n], diag);
     }
     groom_destroy(groom);

@@ -56,8 +56,8 @@ static bool take_groom(struct request *request, const cJSON *body, cJSON *inputs
         respond_bad_field(request, 400, "/groom", "\"groom\" must be the id of a groom");
         return false;
     }
-    if (!cJSON_IsTrue(dense)) {
-        respond_bad_field(request, 400, "/dense", "a groom is carried as its strands are evaluated: say \"dense\": true");
+    if (dense && !cJSON_IsBool(dense)) {
+        respond_bad_field(request, 400, "/dense", "\"dense\" must be true or false");
         return false;
     }
     if (!take_revision(request, body, &revision))

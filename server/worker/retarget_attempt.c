@@ -16,6 +16,7 @@
 #include "server/worker/blob.h"
 #include "server/worker/receive.h"
 #include "server/worker/retarget_body.h"
+#include "server/worker/retarget_groom.h"
 #include "server/worker/retarget_hairline.h"
 #include "server/worker/retarget_part.h"
 #include "server/worker/worker.h"
@@ -30,7 +31,8 @@ struct carrying {
 
     cJSON *request;
     struct groom_retarget_options options;
-    struct groom_strands *strands;          /* what is carried */
+    struct groom_strands *strands;          /* what is carried; or: */
+    struct groom *groom;
     struct retarget_body body;
     struct groom_retarget_source *source;   /* of strands */
     int result;                             /* file of the parts */
@@ -74,11 +76,27 @@ static groom_status read_uploaded(struct carrying *c)
     return st;
 }
 
+static groom_status read_groom(struct carrying *c)
+{
+    struct worker_input input;
+    int fd;
+    groom_status st = receive_file(c->link, WORK_PATH_GROOM, &fd, c->diag);
+    if (st != GROOM_OK)
+        return st;
+    worker_input_open(fd, &input);
+    st = groom_document_read((const char *)input.map, input.n_map, NULL, c->context, &c->groom, c->diag);
+    worker_input_close(&input);
+    close(fd);
+    return st;
+}
+
 static groom_status take_subject(struct carrying *c)
 {
     if (c->order->strands.blob.sha256[0])
         return read_uploaded(c);
-    return receive_strands(c->link, &c->reading, &c->strands, c->diag);
+    return cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(c->request, "dense"))
+               ? receive_strands(c->link, &c->reading, &c->strands, c->diag)
+               : read_groom(c);
 }
 
 /* --- what depends on the source alone ---------------------------------------------------------------- */
@@ -152,17 +170,24 @@ struct target {
     struct groom_retarget_report report;
 };
 
+/* A groom's are those of its strands, and then of its guides. */
+static groom_status carry_roots(struct carrying *c, struct target *t, float (*roots)[3])
+{
+    return c->groom ? groom_retarget_groom_roots(c->groom, c->body.mesh, &c->body.skeleton, NULL, &t->library, &c->reading,
+                                                 roots, c->diag)
+                    : groom_retarget_roots(c->source, &t->library, &c->reading, roots, c->diag);
+}
+
 /* From where the roots are carried to. */
 static groom_status edit_hairline(struct carrying *c, uint32_t i, struct target *t)
 {
     const cJSON *asked = cJSON_GetObjectItemCaseSensitive(target_of(c, i), "hairline");
-    uint32_t n = c->strands->n_strands;
+    uint32_t n = c->groom ? c->groom->n_strands + c->groom->n_guides : c->strands->n_strands;
     char place[40];
     if (!asked)
         return GROOM_OK;
     float(*roots)[3] = malloc(n * sizeof *roots);
-    groom_status st = roots ? groom_retarget_roots(c->source, &t->library, &c->reading, roots, c->diag)
-                            : groom_fail(c->diag, GROOM_ENOMEM, "no memory for a hairline");
+    groom_status st = roots ? carry_roots(c, t, roots) : groom_fail(c->diag, GROOM_ENOMEM, "no memory for a hairline");
     snprintf(place, sizeof place, "/targets/%u/hairline", i);
     if (st == GROOM_OK)
         st = retarget_hairline_edit(asked, place, t->body.mesh, &t->body.skeleton, (const float(*)[3])roots, n, &c->reading,
@@ -286,6 +311,43 @@ static groom_status carry_strands(struct carrying *c, struct target *t)
     return st;
 }
 
+/* The strands that balding leaves, with their numbers. */
+static groom_status keep_groom(struct carrying *c, struct target *t, struct groom **carried, const struct retarget_colours *colours)
+{
+    struct groom *kept = NULL;
+    if (!t->hairline.n_bald)
+        return GROOM_OK;
+    groom_status st = retarget_groom_without(*carried, t->hairline.bald, c->context, &kept, c->diag);
+    if (st != GROOM_OK)
+        return st;
+    for (uint32_t s = 0, n = 0; s < (*carried)->n_strands; s++)
+        if (!t->hairline.bald[s]) {
+            move_value(colours->stretch, n, s);
+            move_value(colours->density, n++, s);
+        }
+    groom_destroy(*carried);
+    *carried = kept;
+    return GROOM_OK;
+}
+
+static groom_status carry_groom(struct carrying *c, struct target *t)
+{
+    struct groom *carried = NULL;
+    struct retarget_colours colours = {.stretch = malloc(c->groom->n_strands * sizeof(float)), .density = t->hairline.density};
+    groom_status st = colours.stretch ? groom_retarget_groom(c->groom, c->body.mesh, &c->body.skeleton, NULL, &t->library,
+                                                             &c->options, c->context, &carried, &t->report, c->diag)
+                                      : groom_fail(c->diag, GROOM_ENOMEM, "no memory for the colours of the strands");
+    if (st == GROOM_OK)
+        st = retarget_groom_stretch(c->groom, carried, &c->reading, colours.stretch, c->diag);
+    if (st == GROOM_OK)
+        st = keep_groom(c, t, &carried, &colours);
+    if (st == GROOM_OK)
+        st = write_part(c, t, NULL, carried, &colours);
+    groom_destroy(carried);
+    free(colours.stretch);
+    return st;
+}
+
 static groom_status carry(struct carrying *c, uint32_t i)
 {
     struct target *t = calloc(1, sizeof *t); /* its report is large */
@@ -295,7 +357,7 @@ static groom_status carry(struct carrying *c, uint32_t i)
     if (st == GROOM_OK)
         st = open_target(c, i, t);
     if (st == GROOM_OK)
-        st = carry_strands(c, t);
+        st = c->groom ? carry_groom(c, t) : carry_strands(c, t);
     close_target(t);
     free(t);
     return st;
@@ -316,6 +378,7 @@ static void close_carrying(struct carrying *c)
 {
     groom_retarget_source_destroy(c->source);
     retarget_body_finish(&c->body);
+    groom_destroy(c->groom);
     groom_strands_destroy(c->strands);
     cJSON_Delete(c->request);
     if (c->result >= 0)

@@ -104,6 +104,16 @@ test('uploaded strands become a groom on the other head, with a report and colou
     assert.deepEqual(await points_of(daemon, many.result.grooms[1].groom), list);
     assert.equal(many.stage.count, 3);
   });
+  await t.test('and back again it is nearly as it was', async () => {
+    const back = await carried(daemon, { groom: made.groom, target: { head }, options: { guides: 12 } });
+    const there = (await expect(daemon, 200, 'GET', `/v1/grooms/${back.result.groom}?arrays=false`)).json;
+    assert.equal(there.base.strands, null); // nobody uploaded these
+    assert.equal(there.retarget.from.groom, made.groom);
+    const before = strands(), after = await points_of(daemon, back.result.groom);
+    let sum = 0;
+    after.forEach((strand, i) => strand.forEach((p, j) => { sum += Math.hypot(...p.map((x, k) => x - before[i][j][k])); }));
+    assert.ok(sum / (N * M) < 6e-3, `${sum / (N * M)} m`); // proportions are unlike: a quarter wider, a tenth flatter
+  });
   await t.test('to its own head nothing moves', async () => {
     const same = await carried(daemon, { strands: str, source: { head }, target: { head } });
     const before = strands(), after = await points_of(daemon, same.result.groom);
@@ -113,23 +123,38 @@ test('uploaded strands become a groom on the other head, with a report and colou
   });
 });
 
-test('a groom is carried as its strands are evaluated', async (t) => {
+test('a procedural groom stays one: guides move, the chain stays', async (t) => {
   const daemon = await startDaemon(t);
   const head = await post_head(daemon, 'ann'), target = await post_head(daemon, 'mara', WIDE);
+  const guides = strands(8);
   const given = groom_document({ n: 24, m: M, guides: 8, name: 'coil' });
-  given.guides.points = array('f32', [8, M, 3], strands(8).flat(2));
+  given.guides.points = array('f32', [8, M, 3], guides.flat(2));
   given.strands.roots = array('f32', [24, 3], strands(24).flatMap((strand) => strand[0]));
   given.source = { head };
   const { groom } = (await expect(daemon, 201, 'POST', '/v1/grooms', { body: given })).json;
-  const job = await carried(daemon, { groom, dense: true, target: { head: target }, options: { guides: 6 } }); // its source is its own head
+  const before = (await expect(daemon, 200, 'GET', `/v1/grooms/${groom}`)).json;
+  const job = await carried(daemon, { groom, target: { head: target } }); // its source is the head it was made with
   assert.deepEqual(job.source, { head });
   assert.equal(job.revision, 1);
-  const document = (await expect(daemon, 200, 'GET', `/v1/grooms/${job.result.groom}?arrays=false`)).json;
-  assert.equal(document.name, 'coil on mara');
-  assert.equal(document.base.strands, job.result.grooms[0].strands);
-  assert.equal(document.strands.count, 24);
-  assert.equal(document.retarget.from.groom, groom);
-  assert.equal(document.source.head, target);
+  const after = (await expect(daemon, 200, 'GET', `/v1/grooms/${job.result.groom}`)).json;
+  assert.equal(after.name, 'coil on mara');
+  assert.equal(after.source.head, target);
+  assert.equal(after.base, undefined);
+  assert.deepEqual(after.operators, before.operators);
+  assert.deepEqual(after.instancing, before.instancing);
+  const moved = decode(after.guides.points);
+  for (let i = 0; i < moved.length; i += 3)
+    if (i % (3 * M)) assert.ok(measure([...moved.slice(i, i + 3)], WIDE) > 0.99);
+  const stretch = decode(after.retarget.strands.stretch);
+  assert.equal(stretch.length, 24);
+  assert.ok(stretch.every((x) => x > 0.7 && x < 1.5), `${stretch}`);
+  await t.test('or its strands are carried as they are evaluated', async () => {
+    const dense = await carried(daemon, { groom, dense: true, target: { head: target }, options: { guides: 6 } });
+    const document = (await expect(daemon, 200, 'GET', `/v1/grooms/${dense.result.groom}?arrays=false`)).json;
+    assert.equal(document.base.strands, dense.result.grooms[0].strands);
+    assert.equal(document.strands.count, 24);
+    assert.equal(document.retarget.from.groom, groom);
+  });
 });
 
 test('what is wrong with a retargeting is said with its place', async (t) => {
@@ -144,7 +169,7 @@ test('what is wrong with a retargeting is said with its place', async (t) => {
     [400, '/groom', { strands: str, groom: 'grm_aaaaaaaaaaaaaaaaaaaa', source, target }],
     [422, '/groom', { groom: 'grm_aaaaaaaaaaaaaaaaaaaa', dense: true, source, target }],
     [400, '/dense', { strands: str, dense: true, source, target }],
-    [400, '/dense', { groom: 'grm_aaaaaaaaaaaaaaaaaaaa', source, target }],
+    [400, '/dense', { groom: 'grm_aaaaaaaaaaaaaaaaaaaa', dense: 1, source, target }],
     [400, '/source/head', { strands: str, target }],
     [422, '/source/head', { strands: str, source: { head: 'head_aaaaaaaaaaaaaaaaaaaa' }, target }],
     [400, '/source/hats', { strands: str, source: { head, hats: 1 }, target }],
@@ -273,6 +298,17 @@ test('the hairline of a target is shown, moved, and the hair grows from there', 
   assert.ok(less.strands.count < n && less.strands.count > n / 2, `${less.strands.count} of ${n}`);
   assert.equal(less.retarget.hairline.bald, n - less.strands.count);
   assert.equal(decode(less.retarget.strands.stretch).length, less.strands.count);
+
+  const whole = groom_document({ n, m: M, guides: 40, name: 'coil' });
+  whole.guides.points = array('f32', [40, M, 3], strands(40).flat(2));
+  whole.strands.roots = array('f32', [n, 3], strands(n).flatMap((strand) => strand[0]));
+  whole.source = { head };
+  const { groom } = (await expect(daemon, 201, 'POST', '/v1/grooms', { body: whole })).json;
+  const receded = await carried(daemon, { groom, target: { head: target, hairline: { kind: 'balding', points: lifted(0.05) } } });
+  const rest = (await expect(daemon, 200, 'GET', `/v1/grooms/${receded.result.groom}`)).json;
+  assert.ok(rest.strands.count < n && rest.strands.count > n / 2, `${rest.strands.count} of ${n}`);
+  assert.equal(rest.guides.count, 40);
+  assert.equal(decode(rest.retarget.strands.density).length, rest.strands.count);
 
   for (const [pointer, body] of [['/hairline/points', { hairline: { points: [[0, 1.7, 0]] } }], ['/target/hairline/kind', { target: { head: target, hairline: { kind: 'mullet', points: lifted(0) } } }],
     ['/target/landmarks/1/target', { target: { head: target, landmarks: [{ source: [0, 0, 0], target: [0, 0, 0] }, { source: [0, 0, 0] }, {}, {}] } }]])
