@@ -17,6 +17,8 @@ static uint64_t word_at(const unsigned char *bytes)
 
 void checksum_add(struct checksum *sum, const void *bytes, size_t n)
 {
+    if (n == 0) /* bytes may be NULL then */
+        return;
     const unsigned char *at = bytes, *end = at + n;
     size_t pending = sum->n_bytes % 8;
     sum->n_bytes += n;

@@ -34,6 +34,9 @@ groom_status job_adapt(struct job *job, float (*result)[3], struct groom_diag *d
 
 /* p-tilde of one particle on the target, in metres. */
 void transfer_anchor(const struct job *job, uint32_t vertex, double out[3]);
+/* The same of a root. Strands grow out of the surface: a root that a capture or a modeller buried goes to where its
+ * ray leaves the body, else its first segment could not get out either. */
+void transfer_root(const struct job *job, uint32_t vertex, double out[3]);
 /* hat, of all strands; shift where the target has roots of its own. */
 groom_status transfer_all(struct job *job, struct groom_diag *diag);
 

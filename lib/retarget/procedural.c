@@ -25,7 +25,7 @@ struct carrying {
 /* --- points ------------------------------------------------------------------------------- */
 
 /* Points are carried as the vertices of one strand of which nothing but the places counts. */
-static groom_status carry_points(const struct carrying *c, const float (*points)[3], uint32_t n, float (*out)[3])
+static groom_status carry_points(const struct carrying *c, const float (*points)[3], uint32_t n, int are_roots, float (*out)[3])
 {
     struct groom_strands *strands = NULL;
     struct groom_retarget_source *source = NULL;
@@ -44,7 +44,7 @@ static groom_status carry_points(const struct carrying *c, const float (*points)
         struct job job = {.source = source, .target = c->target};
         for (uint32_t i = 0; i < n; i++) {
             double p[3];
-            transfer_anchor(&job, i, p);
+            (are_roots ? transfer_root : transfer_anchor)(&job, i, p);
             for (int k = 0; k < 3; k++)
                 out[i][k] = (float)p[k];
         }
@@ -144,9 +144,9 @@ static void carry_frame(const struct box_map *map, struct groom_layer_frame *fra
 static groom_status carry_layer(const struct carrying *c, struct groom_layer *layer)
 {
     struct box_map map = map_boxes(c->body, c->target->body);
-    groom_status st = carry_points(c, (const float(*)[3])layer->anchors.position, layer->anchors.n, layer->anchors.position);
+    groom_status st = carry_points(c, (const float(*)[3])layer->anchors.position, layer->anchors.n, 0, layer->anchors.position);
     if (st == GROOM_OK)
-        st = carry_points(c, (const float(*)[3])layer->contact.position, layer->contact.n, layer->contact.position);
+        st = carry_points(c, (const float(*)[3])layer->contact.position, layer->contact.n, 0, layer->contact.position);
     for (uint32_t i = 0; i < layer->n_frames; i++)
         carry_frame(&map, &layer->frames[i]);
     if (st == GROOM_OK && layer->target)
@@ -245,7 +245,7 @@ static groom_status carry(const struct carrying *c, struct groom *groom, struct 
         if (st == GROOM_OK && roots)
             memcpy(groom->roots, roots, groom->n_strands * sizeof *roots);
         else if (st == GROOM_OK)
-            st = carry_points(c, (const float(*)[3])groom->roots, groom->n_strands, groom->roots);
+            st = carry_points(c, (const float(*)[3])groom->roots, groom->n_strands, 1, groom->roots);
     }
     for (uint32_t i = 0; st == GROOM_OK && i < groom->n_operators; i++)
         if (groom->operators[i].layer)
@@ -292,5 +292,5 @@ groom_status groom_retarget_groom_roots(const struct groom *groom, const struct 
         memcpy(roots[i], groom->base ? groom->base[groom->first[i]] : groom->roots[i], sizeof *roots);
     for (uint32_t i = 0; i < groom->n_guides; i++)
         memcpy(roots[groom->n_strands + i], groom->guides[(size_t)i * groom->n_vertices], sizeof *roots);
-    return carry_points(&c, (const float(*)[3])roots, groom->n_strands + groom->n_guides, roots);
+    return carry_points(&c, (const float(*)[3])roots, groom->n_strands + groom->n_guides, 1, roots);
 }

@@ -430,7 +430,7 @@ groom_status groom_retarget_roots(const struct groom_retarget_source *source, co
     (void)context;
     for (uint32_t i = 0; st == GROOM_OK && i < source->strands->n_strands; i++) {
         double p[3];
-        transfer_anchor(&job, source->strands->first[i], p);
+        transfer_root(&job, source->strands->first[i], p);
         for (int c = 0; c < 3; c++)
             roots[i][c] = (float)p[c];
     }

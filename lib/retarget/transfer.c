@@ -10,6 +10,7 @@
 
 #define PIECE 64              /* strands */
 #define SHORTEST 1e-9         /* metres: shorter segments count as this long */
+#define ROOT_DEPTH 1e-4f      /* metres: a root that was deeper below the surface comes to lie on it */
 
 /* --- Eq. 3 -------------------------------------------------------------------------- */
 
@@ -41,6 +42,16 @@ void transfer_anchor(const struct job *job, uint32_t vertex, double out[3])
         p = vec_add(q, vec_scale(vec_unit(vec_sub(q, o)), anchor->eta));
     }
     out[0] = p.x, out[1] = p.y, out[2] = p.z;
+}
+
+void transfer_root(const struct job *job, uint32_t vertex, double out[3])
+{
+    const struct anchor *anchor = &job->source->anchors[vertex];
+    transfer_anchor(job, vertex, out);
+    if (anchor->bone == ANCHOR_NO_BONE || anchor->eta > -ROOT_DEPTH)
+        return;
+    struct vec q = surface_point(job->target->body, anchor);
+    out[0] = q.x, out[1] = q.y, out[2] = q.z;
 }
 
 /* --- Eqs. 4 to 6 ------------------------------------------------------------------------ */
@@ -126,7 +137,10 @@ static uint64_t transfer_strand(struct job *job, const struct smoothing *s, uint
     const float(*rest)[3] = (const float(*)[3])source->strands->points + first;
     for (uint32_t i = 0; i < n; i++) {
         double p[3];
-        transfer_anchor(job, first + i, p);
+        if (i == 0)
+            transfer_root(job, first, p);
+        else
+            transfer_anchor(job, first + i, p);
         for (int c = 0; c < 3; c++)
             s->e[i][c] = p[c] - rest[i][c];
         s->arc[i] = i ? s->arc[i - 1] + segment_length(rest[i - 1], rest[i]) : 0;

@@ -59,10 +59,11 @@ static groom_status load(const struct groom_strands *strands, const struct groom
     header.inputs = empty->inputs;
     groom_retarget_source_destroy(empty);
     memcpy(header.magic, STORE_MAGIC, sizeof header.magic);
-    checksum_add(&sum, payload, n);
-    uint64_t checksum = checksum_finish(&sum);
     memcpy(file, &header, sizeof header);
-    memcpy(file + sizeof header, payload, n);
+    if (n > 0)
+        memcpy(file + sizeof header, payload, n);
+    checksum_add(&sum, file + sizeof header, n);
+    uint64_t checksum = checksum_finish(&sum);
     memcpy(file + sizeof header + n, &checksum, sizeof checksum);
     struct groom_source bytes = groom_source_from_memory(&state, file, sizeof header + n + sizeof checksum);
     groom_status st = groom_retarget_source_load(&bytes, strands, body, skeleton, NULL, options, NULL, source, NULL);

@@ -193,6 +193,27 @@ START_TEST(roots_stay_on_the_surface)
 }
 END_TEST
 
+START_TEST(buried_roots_come_to_lie_on_the_surface)
+{
+    struct scene s;
+    struct groom_bvh *bvh;
+    scene_init(&s, GROOM_SAMPLE_SHORT, 200, 10, 1);
+    sink(s.strands, 0.006);
+    for (uint32_t i = 0; i < s.strands->n_strands; i++) /* the roots as well */
+        s.strands->points[s.strands->first[i]][1] -= 0.006f;
+    points out = room_for(s.strands);
+    struct groom_retarget_report report = carry(s.strands, &s.self, &s.target, &s.options, NULL, out);
+    ck_ok(groom_bvh_create(s.other, NULL, &bvh, NULL));
+    for (uint32_t i = 0; i < s.strands->n_strands; i++)
+        ck_assert_double_ge(groom_bvh_signed_distance(bvh, out[s.strands->first[i]]), -1.2e-4);
+    ck_assert_double_le(report.length_ratio_max, 2.0); /* nothing is torn out of the head */
+    assert_outside(s.strands, (const float(*)[3])out, s.other, s.options.clearance);
+    groom_bvh_destroy(bvh);
+    free(out);
+    scene_finish(&s);
+}
+END_TEST
+
 /* --- scales ------------------------------------------------------------------------------------ */
 
 START_TEST(two_scales_come_near_the_global_solution)
@@ -516,7 +537,7 @@ START_TEST(every_failing_allocation_of_a_groom_is_told)
 END_TEST
 
 TEST_SUITE("retarget_samples", retargeting_to_oneself_changes_nothing, there_and_back_is_nearly_where_it_was,
-           what_is_inside_is_brought_out, roots_stay_on_the_surface, two_scales_come_near_the_global_solution,
+           what_is_inside_is_brought_out, roots_stay_on_the_surface, buried_roots_come_to_lie_on_the_surface, two_scales_come_near_the_global_solution,
            same_bits_for_any_pool, weight_follows_equation_20, moved_roots_are_kept_and_tips_hardly_follow,
            a_procedural_groom_stays_procedural, a_groom_made_of_strands_has_them_carried,
            control_points_of_layers_go_with_the_head, what_cannot_be_is_refused,
