@@ -62,6 +62,19 @@ test('from files to a groom, a knob, back, and home', { skip, timeout: 300000 },
     assert.notDeepEqual(await shown(page), held);
     await page.getByLabel(/^guides/).uncheck();
   });
+  await t.test('and goes where the arrows say, without a mouse', async () => {
+    await page.getByLabel(/^guides/).check();
+    await page.locator('.picture canvas').focus();
+    await page.keyboard.press(']');
+    const tip = () => page.evaluate(() => Array.from(window.studio.editor.guide.slice(-3)));
+    const from = await tip();
+    await page.keyboard.press('ArrowRight');
+    await settled(page, 6);
+    const to = await tip();
+    assert.ok(to[0] - from[0] > 0.001 && to[0] - from[0] < 0.0045, `${from} ${to}`);
+    assert.match(await page.locator('#status').textContent(), /guide 1 of|strands/);
+    await page.getByLabel(/^guides/).uncheck();
+  });
   await t.test('what is downloaded is what is shown', async () => {
     await page.locator('select[name=format]').selectOption('data');
     await page.locator('select[name=unit]').selectOption('m');
@@ -148,6 +161,8 @@ test('ruffle and sculpt: seen under the hand, kept as layers, taken away again',
 
 test('pages pass an accessibility check and fit a narrow window', { skip, timeout: 120000 }, async (t) => {
   const daemon = await startDaemon(t), folder = sample(t), page = await startBrowser(t, daemon);
+  const policy = (await daemon.fetch('/')).headers.get('content-security-policy');
+  assert.match(policy, /default-src 'none'.*script-src 'self'.*connect-src 'self'/);
   const axe = readFileSync(new URL('../node_modules/axe-core/axe.min.js', import.meta.url), 'utf8');
   for (const [at, ready] of [['/', '.grooms'], [`/#/grooms/${await imported(daemon, folder)}`, '.chain .lil-gui']]) {
     await page.goto(daemon.url + at);
@@ -155,8 +170,16 @@ test('pages pass an accessibility check and fit a narrow window', { skip, timeou
     const violations = await page.evaluate(`${axe};axe.run(document).then((r) => r.violations.map((v) => v.id + ': ' + v.nodes.map((n) => n.html).join(' ')))`);
     assert.deepEqual(violations, [], at);
   }
+  await page.getByLabel('colour by').selectOption('beta');
+  await page.getByRole('button', { name: 'show armature' }).click();
+  await page.locator('.legend').getByText(/wave/).waitFor();
+  assert.deepEqual(await page.evaluate(`axe.run(document).then((r) => r.violations.map((v) => v.id))`), [], 'with a legend and an armature');
   await page.setViewportSize({ width: 420, height: 700 });
-  assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), 'nothing sticks out to the right');
+  for (const at of [null, '/']) {
+    if (at) await page.goto(daemon.url + at);
+    assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), 'nothing sticks out to the right');
+  }
+  await picture(page, 'studio-narrow');
 });
 
 test('a file that is none is refused in words', { skip, timeout: 120000 }, async (t) => {

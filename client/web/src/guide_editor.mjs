@@ -1,9 +1,11 @@
 /* A guide under the hand: pick it, drag a vertex, and its length is kept. */
 import * as THREE from 'three';
-import { notice } from './dom.mjs';
+import { notice, say } from './dom.mjs';
 import { arrayOf } from './strands.mjs';
 
-const NEAR_PX = 12, HANDLES = 9, ROUNDS = 8;
+/* Where arrows move a point, right and up in the picture. */
+const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+const STEP_M = 0.004, NEAR_PX = 12, HANDLES = 9, ROUNDS = 8;
 
 const vertex = (points, j) => new THREE.Vector3().fromArray(points, 3 * j);
 
@@ -40,11 +42,13 @@ export class GuideEditor {
         Object.assign(this, { viewer, session, on: false, chosen: -1 });
         this.handles = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ color: 0xffffff, size: 8, sizeAttenuation: false, depthTest: false }));
         this.line = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: 0xffffff, depthTest: false }));
-        for (const part of [this.handles, this.line]) Object.assign(part, { visible: false, renderOrder: 1, frustumCulled: false });
+        for (const part of [this.handles, this.line]) Object.assign(part, { visible: false, renderOrder: 4, frustumCulled: false });
         viewer.scene.add(this.handles, this.line);
         viewer.canvas.addEventListener('pointerdown', (event) => this.#press(event), { capture: true });
         viewer.canvas.addEventListener('pointermove', (event) => this.#move(event));
         viewer.canvas.addEventListener('pointerup', () => this.#release());
+        viewer.canvas.addEventListener('keydown', (event) => this.#key(event));
+        viewer.canvas.addEventListener('keyup', (event) => { if (KEYS[event.key] && this.moved) this.settle().catch(notice); });
         session.addEventListener('document', () => this.#load());
         this.#load();
     }
@@ -115,6 +119,28 @@ export class GuideEditor {
         this.#show();
     }
 
+    /* Without a mouse: [ and ] pick a guide, - and + one of its points, arrows move that. */
+    #key(event) {
+        if (!this.on || !this.count) return;
+        const next = { '[': -1, ']': 1 }[event.key], along = { '-': -1, '+': 1, '=': 1 }[event.key], arrow = KEYS[event.key];
+        if (next) {
+            this.chosen = (this.chosen < 0 && next < 0 ? this.count : this.chosen) + next;
+            this.chosen = (this.chosen + this.count) % this.count;
+            this.grip = this.vertices - 1;
+        } else if (along && this.chosen >= 0) {
+            const at = Math.max(0, this.grips.indexOf(this.grip));
+            this.grip = this.grips[Math.max(0, Math.min(this.grips.length - 1, at + along))];
+        } else if (arrow && this.chosen >= 0) {
+            const x = new THREE.Vector3(), y = new THREE.Vector3();
+            this.viewer.camera.matrixWorld.extractBasis(x, y, new THREE.Vector3());
+            this.grip = this.grips.includes(this.grip) ? this.grip : this.vertices - 1;
+            this.drag(this.chosen, this.grip, vertex(this.guide, this.grip).addScaledVector(x, STEP_M * arrow[0]).addScaledVector(y, STEP_M * arrow[1]));
+        } else return;
+        event.preventDefault();
+        say(`guide ${this.chosen + 1} of ${this.count}, point ${this.grips.indexOf(this.grip) + 1} of ${this.grips.length}`);
+        this.#show();
+    }
+
     #move(event) {
         if (!this.plane) return;
         const { width, height } = this.viewer.canvas.getBoundingClientRect(), ray = new THREE.Raycaster();
@@ -138,5 +164,8 @@ export class GuideEditor {
         if (this.moved) this.settle().catch(notice);
     }
 
-    settle() { return this.session.putGuides(fileOf(this.points, this.count, this.vertices)); }
+    settle() {
+        this.moved = false;
+        return this.session.putGuides(fileOf(this.points, this.count, this.vertices));
+    }
 }

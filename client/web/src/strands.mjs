@@ -1,6 +1,7 @@
 /* Strands and heads as the daemon has them, ready to be shown. */
 import { BufferGeometry, Float32BufferAttribute } from 'three';
 import { OBJLoader } from 'three/addons/loaders/OBJLoader.js';
+import { mergeVertices } from 'three/addons/utils/BufferGeometryUtils.js';
 import { PLYLoader } from 'three/addons/loaders/PLYLoader.js';
 import { bytesOf } from '../engine/engine.mjs';
 import { bytes, get } from './api.mjs';
@@ -55,7 +56,8 @@ export async function fetchHead(id) {
     const [{ format, unit_m, up }, buffer] = await Promise.all([get(`/v1/heads/${id}`), bytes(`/v1/heads/${id}/data`)]);
     const geometry = geometryOf(format, buffer);
     intoMetres(geometry.getAttribute('position').array, unit_m, up);
-    return geometry;
+    for (const name of Object.keys(geometry.attributes)) if (name !== 'position') geometry.deleteAttribute(name);
+    return mergeVertices(geometry, 1e-6); /* triangles of a file share corners: smooth normals need them to */
 }
 
 /* An array of a document: { dtype, shape, data }. */

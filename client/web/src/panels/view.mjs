@@ -114,7 +114,7 @@ export function viewPanel(parent, { session, viewer, evaluation, editor, shine }
     });
     const panel = element('section', { class: 'panel' }, element('h2', {}, 'View'), element('div', { class: 'row' }, looks), comparing,
         element('label', {}, 'density', density), colours.rows,
-        element('label', {}, guides, 'guides: click one, drag its points; operator guides in orange'));
+        element('label', { title: 'Without a mouse, in the picture: [ and ] pick one, − and + a point of it, arrows move that' }, guides, 'guides: click one, drag its points; operator guides in orange'));
     parent.append(panel);
     cameraControl(session, viewer).then((control) => control && panel.append(control)).catch(notice);
     return { reload, colours };

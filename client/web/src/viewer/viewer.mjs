@@ -8,6 +8,29 @@ const FIELD_OF_VIEW = 20, MARGIN = 1.12;
 export const VIEWS = { front: [0, 0, 1], side: [1, 0, 0], back: [0, 0, -1], top: [0, 1, 0.001] };
 export const COMPARISONS = ['groom', 'target', 'side by side', 'overlay', 'wipe'];
 
+/* Skin that the hair throws its shadow on: the light that arrives among the strands, where that is known. */
+function skin({ light, lightOrigin, lightSize, lit }) {
+    const material = new THREE.MeshStandardMaterial({ color: 0xb98a74, roughness: 0.75, side: THREE.DoubleSide });
+    material.onBeforeCompile = (shader) => {
+        Object.assign(shader.uniforms, { light, lightOrigin, lightSize, lit });
+        shader.vertexShader = shader.vertexShader.replace('void main() {', 'varying vec3 place;\nvoid main() {\nplace = position;');
+        shader.fragmentShader = shader.fragmentShader
+            .replace('void main() {', `precision highp sampler3D;
+                uniform sampler3D light; uniform vec3 lightOrigin, lightSize; uniform bool lit; varying vec3 place;
+                vec2 arriving() {
+                    vec3 at = (place - lightOrigin) / lightSize, edge = smoothstep(0.0, 0.15, min(at, 1.0 - at));
+                    return lit ? mix(vec2(1.0), texture(light, at).rg, edge.x * edge.y * edge.z) : vec2(1.0);
+                }
+                void main() {`)
+            .replace('#include <lights_fragment_end>', `#include <lights_fragment_end>
+                vec2 seen = arriving();
+                reflectedLight.directDiffuse *= 0.25 + 0.75 * seen.r;
+                reflectedLight.directSpecular *= seen.r;
+                reflectedLight.indirectDiffuse *= 0.35 + 0.65 * seen.g;`);
+    };
+    return material;
+}
+
 /* Lines of a pinhole camera's pyramid, [..][3]: p = R x + t in its own axes (x right, y down, z forward). */
 function frustumOf({ width, height, fx, fy, cx, cy, rotation, translation }, depth) {
     const toWorld = (p) => [0, 1, 2].map((c) => rotation.reduce((sum, row, k) => sum + row[c] * (p[k] - translation[k]), 0));
@@ -35,7 +58,9 @@ export class Viewer {
         this.target = this.#hair([0.24, 0.17, 0.11]);
         this.guides = new THREE.Group();
         this.cameras = new THREE.Group();
-        this.scene.add(this.guides, this.cameras, new THREE.HemisphereLight(0xdfe6f2, 0x60534a, 2.2));
+        const key = new THREE.DirectionalLight(0xfff4e6, 1.6);
+        key.position.copy(Viewer.KEY);
+        this.scene.add(this.guides, this.cameras, new THREE.HemisphereLight(0xdfe6f2, 0x60534a, 1.5), key);
         this.comparison = 'groom';
         this.wipe = 0.5;
         this.background = new THREE.Color(0x23262b);
@@ -67,23 +92,31 @@ export class Viewer {
     }
 
     setHead(geometry) {
-        if (this.head) this.scene.remove(this.head);
+        if (this.head) this.scene.remove(this.head, this.occluder);
         geometry.computeVertexNormals();
-        this.head = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({ color: 0xa07864, roughness: 0.75, side: THREE.DoubleSide }));
-        this.scene.add(this.head);
+        this.head = new THREE.Mesh(geometry, skin(this.groom.material.uniforms));
+        this.occluder = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ colorWrite: false, side: THREE.DoubleSide }));
+        this.occluder.renderOrder = 2;
+        this.occluder.onBeforeRender = () => this.renderer.clearDepth();
+        this.occluder.visible = this.guides.children.length > 0;
+        this.scene.add(this.head, this.occluder);
         this.draw();
     }
 
-    /* Polylines [count][vertices][3]; chosen: indices drawn in the other colour. */
+    /* Polylines [count][vertices][3]; chosen: indices drawn in the other colour. Hair does not hide them, the head
+     * does: depth is cleared behind the hair, and the head's drawn again. */
     setGuides({ points, count, vertices }, chosen = new Set()) {
         this.guides.clear();
+        if (this.occluder) this.occluder.visible = count > 0;
         for (const [own, color] of [[(i) => !chosen.has(i), 0x5fb4ff], [(i) => chosen.has(i), 0xffb454]]) {
             const ends = [];
             for (let g = 0; g < count; g++)
                 for (let j = 0; own(g) && j + 1 < vertices; j++)
                     for (let k = 0; k < 6; k++) ends.push(points[3 * (g * vertices + j) + k]);
             const geometry = new THREE.BufferGeometry().setAttribute('position', new THREE.Float32BufferAttribute(ends, 3));
-            this.guides.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color, transparent: true, opacity: 0.85 })));
+            const lines = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color }));
+            lines.renderOrder = 3;
+            this.guides.add(lines);
         }
         this.draw();
     }
