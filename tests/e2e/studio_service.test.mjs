@@ -129,7 +129,7 @@ test('colours, revisions side by side, and a sample that is fair', { skip, timeo
       const [value, daemons] = await page.evaluate(async (column) => {
         const { session, viewer } = window.studio, { count, document: { strands: { vertices } } } = session;
         const table = new Float32Array(await (await fetch(`${session.at}/analysis?format=binary&count=${count}`)).arrayBuffer());
-        return [viewer.groom.values.array[session.slotOf[17] * vertices + 9], table[4 * (17 * vertices + 9) + column]];
+        return [viewer.groom.values[session.slotOf[17] * vertices + 9], table[4 * (17 * vertices + 9) + column]];
       }, { radius: 0, hand: 2, beta: 3 }[by]);
       if (by === 'radius') assert.ok(daemons === 0 ? Number.isNaN(value) : Math.abs(Math.exp(value) / daemons - 1) < 1e-5);
       else assert.equal(value, daemons);
@@ -156,7 +156,7 @@ test('colours, revisions side by side, and a sample that is fair', { skip, timeo
     assert.equal(await page.evaluate(() => window.studio.viewer.comparison), 'side by side');
     const moved = await page.evaluate(() => {
       const { evaluation: { strands: a }, viewer: { target: b } } = window.studio;
-      return [a.count === b.count, a.points.some((x, i) => Math.abs(x - b.buffer.array[i]) > 1e-3)];
+      return [a.count === b.count, a.points.some((x, i) => Math.abs(x - b.held[i]) > 1e-3)];
     });
     assert.deepEqual(moved, [true, true]);
   });

@@ -3,7 +3,7 @@
  * waited for, so that no frames pile up; how long it took says how much it can take. */
 const MOVING_MS = 25, RESTING_MS = 150, IDLE_MS = 500, POLL_MS = 4;
 const FIRST = 40000; /* segments, of a card that is not known yet */
-const LEAST = 20000; /* fewer are no picture */
+const LEAST = 10000; /* fewer are no picture */
 
 export class Detail {
     /* redraw: asked for when there is more to draw, or the card is free again */
@@ -45,7 +45,7 @@ export class Detail {
 
     #done(segments, took) {
         const measured = segments / Math.max(took, 1), first = !this.measured;
-        if (segments >= LEAST / 2) {
+        if (segments >= LEAST) {
             this.per_ms = first ? measured : 0.5 * (this.per_ms + measured);
             this.measured = true;
         }

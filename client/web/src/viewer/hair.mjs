@@ -1,54 +1,74 @@
-/* Strands as ribbons: one buffer of points, read four times with an offset, so that an edit uploads
- * each point once. Strands stand in a fair order: fewer of them, from the first on, look like all. */
+/* Strands as ribbons whose points stand in a texture: an edit uploads each point once. Strands stand in a fair
+ * order: fewer of them, from the first on, look like all. */
 import * as THREE from 'three';
 import vertexShader from './hair.vert.glsl';
 import fragmentShader from './hair.frag.glsl';
 
-const CORNERS = new Float32Array([0, -1, 0, 1, 1, -1, 1, 1]);
+const palette = (data) => Object.assign(new THREE.DataTexture(data, 256, 1), { minFilter: THREE.LinearFilter, magFilter: THREE.LinearFilter, needsUpdate: true });
 
-const texture = (data) => Object.assign(new THREE.DataTexture(data, 256, 1), { minFilter: THREE.LinearFilter, magFilter: THREE.LinearFilter, needsUpdate: true });
+/* Rows of `width` numbers that hold at least `n`. */
+function numbers(n, width) {
+    const rows = Math.max(1, Math.ceil(n / width)), made = new THREE.DataTexture(new Float32Array(rows * width), width, rows, THREE.RedFormat, THREE.FloatType);
+    made.needsUpdate = true;
+    return made;
+}
+
+/* Vertices in a row of the textures, three numbers each: what every WebGL 2 takes, and the daemon's largest groom
+ * fills no more rows than that. */
+export const ROW = 1365;
+
+/* Two triangles a segment, strand after strand. */
+function ribbons(count, vertices) {
+    const index = new Uint32Array(6 * count * (vertices - 1));
+    for (let strand = 0, at = 0; strand < count; strand++)
+        for (let j = 0, v = 2 * strand * vertices; j + 1 < vertices; j++, v += 2) {
+            index[at++] = v;
+            index[at++] = v + 1;
+            index[at++] = v + 2;
+            index[at++] = v + 2;
+            index[at++] = v + 1;
+            index[at++] = v + 3;
+        }
+    return index;
+}
 
 export class Hair extends THREE.Mesh {
     constructor(color = [0.20, 0.105, 0.05]) {
         const material = new THREE.RawShaderMaterial({
-            glslVersion: THREE.GLSL3, vertexShader, fragmentShader, side: THREE.DoubleSide,
+            glslVersion: THREE.GLSL3, vertexShader, fragmentShader, side: THREE.DoubleSide, defines: { ROW },
             uniforms: {
+                points: { value: null }, values: { value: null },
                 vertices: { value: 2 }, width: { value: 1e-4 }, pixel: { value: 1e-3 }, lit: { value: false },
                 color: { value: new THREE.Vector3(...color) },
                 keyDirection: { value: new THREE.Vector3(0, 1, 0) }, rimDirection: { value: new THREE.Vector3(0, 1, 0) },
                 light: { value: null }, lightOrigin: { value: new THREE.Vector3() }, lightSize: { value: new THREE.Vector3(1, 1, 1) },
-                coloured: { value: false }, palette: { value: texture(new Uint8Array(1024)) }, range: { value: new THREE.Vector2(0, 1) },
+                coloured: { value: false }, palette: { value: palette(new Uint8Array(1024)) }, range: { value: new THREE.Vector2(0, 1) },
             },
         });
-        super(new THREE.InstancedBufferGeometry(), material);
+        super(new THREE.BufferGeometry(), material);
         this.frustumCulled = false;
         this.count = 0;
-        this.drawn = Infinity;
     }
 
-    /* points: [3 + count * vertices * 3 + 6], one vertex of room before and two behind */
+    /* points: [3 + count * vertices * 3 + 6], of which those between the ends are looked at. */
     show({ points, count, vertices, evaluated = count }) {
-        const { uniforms } = this.material;
-        if (this.buffer?.array.length === points.length) {
-            this.buffer.array = points;
-            this.buffer.needsUpdate = true;
-        } else this.#allocate(points, count * vertices);
-        if (this.vertices !== vertices || this.count !== count) uniforms.coloured.value = false;
-        Object.assign(this, { count, vertices, evaluated });
+        const { uniforms } = this.material, changed = this.vertices !== vertices || this.count !== count;
+        if (changed) this.#allocate(count, vertices);
+        Object.assign(this, { count, vertices, evaluated, held: points });
+        uniforms.points.value.image.data.set(points.subarray(3, 3 + 3 * count * vertices));
+        uniforms.points.value.needsUpdate = true;
         uniforms.vertices.value = vertices;
         this.visible = true;
     }
 
-    #allocate(points, n) {
+    #allocate(count, vertices) {
+        const { uniforms } = this.material;
+        uniforms.points.value?.dispose();
+        uniforms.points.value = numbers(3 * count * vertices, 3 * ROW);
+        uniforms.coloured.value = false;
         this.geometry.dispose();
-        this.geometry = new THREE.InstancedBufferGeometry();
-        this.geometry.setIndex([0, 1, 2, 2, 1, 3]);
-        this.geometry.setAttribute('corner', new THREE.BufferAttribute(CORNERS, 2));
-        this.buffer = new THREE.InstancedInterleavedBuffer(points, 3).setUsage(THREE.DynamicDrawUsage);
-        ['before', 'p', 'q', 'after'].forEach((name, i) =>
-            this.geometry.setAttribute(name, new THREE.InterleavedBufferAttribute(this.buffer, 3, 3 * i)));
-        this.values = null;
-        this.n = n;
+        this.geometry = new THREE.BufferGeometry();
+        this.geometry.setIndex(new THREE.BufferAttribute(ribbons(count, vertices), 1));
     }
 
     /* Coloured by `values` [count * vertices] along a palette, or as hair again. */
@@ -56,21 +76,20 @@ export class Hair extends THREE.Mesh {
         const { uniforms } = this.material;
         uniforms.coloured.value = Boolean(by);
         if (!by) return;
-        const array = new Float32Array(this.n + 1);
-        array.set(by.values);
-        this.values = new THREE.InstancedInterleavedBuffer(array, 1);
-        ['value_p', 'value_q'].forEach((name, i) =>
-            this.geometry.setAttribute(name, new THREE.InterleavedBufferAttribute(this.values, 1, i)));
+        uniforms.values.value?.dispose();
+        uniforms.values.value = numbers(by.values.length, ROW);
+        uniforms.values.value.image.data.set(by.values);
+        this.values = by.values;
         uniforms.palette.value.dispose();
-        uniforms.palette.value = texture(by.palette);
+        uniforms.palette.value = palette(by.palette);
         uniforms.range.value.set(...by.range);
     }
 
     /* How many strands are drawn, each as wide as stands for the rest. */
     draw(most, diagonal) {
-        this.drawn = Math.max(1, Math.min(this.evaluated, most));
-        this.geometry.instanceCount = this.drawn * this.vertices;
-        this.material.uniforms.width.value = Hair.widthOf(diagonal, this.drawn);
+        const drawn = Math.max(1, Math.min(this.evaluated, most));
+        this.geometry.setDrawRange(0, 6 * drawn * (this.vertices - 1));
+        this.material.uniforms.width.value = Hair.widthOf(diagonal, drawn);
     }
 
     /* A full head has about 100 000 hairs of 0.08 mm; fewer strands are drawn wider, each for several. */
@@ -91,8 +110,7 @@ export class Hair extends THREE.Mesh {
 
     dispose() {
         this.geometry.dispose();
-        this.material.uniforms.light.value?.dispose();
-        this.material.uniforms.palette.value.dispose();
+        for (const name of ['light', 'palette', 'points', 'values']) this.material.uniforms[name].value?.dispose();
         this.material.dispose();
     }
 }

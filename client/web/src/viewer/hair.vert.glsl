@@ -1,10 +1,11 @@
 precision highp float;
 precision highp sampler3D;
+precision highp sampler2D;
 
-/* A ribbon a segment that faces the camera; four corners an instance, strands of one vertex count. */
-in vec2 corner;              /* x: 0 or 1 along the segment, y: -1 or 1 across */
-in vec3 before, p, q, after; /* the segment p q and the vertices around it */
-in float value_p, value_q;   /* what p and q are coloured by */
+/* A ribbon a strand that faces the camera: two corners a vertex, 2 i and 2 i + 1 of vertex i; strands of one
+ * vertex count. Points and what they are coloured by stand in textures, three texels and one of a vertex in rows
+ * of ROW vertices, so that an edit uploads each point once and nothing is drawn an instance at a time. */
+uniform sampler2D points, values;
 
 uniform mat4 modelViewMatrix, projectionMatrix;
 uniform vec3 cameraPosition;
@@ -59,25 +60,24 @@ vec3 shadeAt(vec3 at, vec3 tangent, uint strand, float value)
          + vec3(0.75, 0.83, 0.95) * open * seen.y * lightOn(tangent, rimDirection, view, own, shift);
 }
 
+vec3 pointAt(int i)
+{
+    ivec2 at = ivec2(3 * (i % ROW), i / ROW);
+    return vec3(texelFetch(points, at, 0).r, texelFetch(points, at + ivec2(1, 0), 0).r, texelFetch(points, at + ivec2(2, 0), 0).r);
+}
+
 void main()
 {
-    int along = gl_InstanceID % vertices;
-    uint strand = uint(gl_InstanceID / vertices);
-    if (along == vertices - 1) { /* from a tip to the next root: nothing */
-        gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
-        shade = vec3(0.0);
-        return;
-    }
-    bool tip = corner.x > 0.5;
-    vec3 segment = q - p, at = tip ? q : p;
-    vec3 bend = tip ? (along == vertices - 2 ? segment : after - p) : (along == 0 ? segment : q - before);
+    int i = gl_VertexID / 2, along = i % vertices;
+    uint strand = uint(i / vertices);
+    bool root = along == 0, tip = along == vertices - 1;
+    vec3 at = pointAt(i), bend = (tip ? at : pointAt(i + 1)) - (root ? at : pointAt(i - 1));
     float size = length(bend);
     vec3 tangent = size > 0.0 ? bend / size : vec3(0.0, -1.0, 0.0);
-    vec3 view = cameraPosition - at;
-    vec3 side = cross(tangent, view);
-    float across = length(side), taper = tip && along == vertices - 2 ? 0.35 : 1.0;
+    vec3 view = cameraPosition - at, side = cross(tangent, view);
+    float across = length(side), taper = tip ? 0.35 : 1.0;
     float half_width = 0.5 * max(width * taper, pixel * length(view));
-    at += (across > 0.0 ? side / across : vec3(0.0)) * corner.y * half_width;
-    gl_Position = projectionMatrix * modelViewMatrix * vec4(at, 1.0);
-    shade = shadeAt(tip ? q : p, tangent, strand, tip ? value_q : value_p);
+    vec3 corner = at + (across > 0.0 ? side / across : vec3(0.0)) * (gl_VertexID % 2 == 0 ? -half_width : half_width);
+    gl_Position = projectionMatrix * modelViewMatrix * vec4(corner, 1.0);
+    shade = shadeAt(at, tangent, strand, coloured ? texelFetch(values, ivec2(i % ROW, i / ROW), 0).r : 0.0);
 }
