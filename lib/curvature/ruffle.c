@@ -4,12 +4,14 @@
 
 #include "base/memory.h"
 #include "curvature/pieces.h"
+#include "curvature/ruffle.h"
 #include "groom/curvature.h"
 #include "groom/random.h"
 
 struct ruffle_job {
     const struct groom_superhelices *in;
     const struct groom_ruffle_options *options;
+    const struct ruffle_draws *draws; /* NULL: Philox */
     const struct groom_allocator *allocator;
     struct groom_superhelices *out;
     uint32_t n_groups;
@@ -133,18 +135,39 @@ static void add_pick(const struct ruffle_job *job, struct picks *picks, uint32_t
  * draws of their own from here on. */
 #define DONOR_DRAWS (1u << 19)
 
+/* The numbers of one strand. */
+struct strand_draws {
+    const struct ruffle_job *job;
+    struct groom_random_key key;
+    uint32_t strand, drawn, block[4]; /* which block */
+};
+
+static double draw_chance(struct strand_draws *d, uint32_t j)
+{
+    if (d->job->draws)
+        return d->job->draws->uniform(d->job->draws->user, d->strand, j, RUFFLE_CHANCE);
+    if (d->drawn != j / 4)
+        groom_random_block(d->key, d->strand, d->drawn = j / 4, d->block);
+    return (d->block[j % 4] + 0.5) * 0x1p-32;
+}
+
+static uint32_t draw_below(const struct strand_draws *d, uint32_t j, uint32_t n)
+{
+    const struct ruffle_draws *draws = d->job->draws;
+    return draws ? (uint32_t)(n * draws->uniform(draws->user, d->strand, j, RUFFLE_DONOR))
+                 : groom_random_below(d->key, d->strand, DONOR_DRAWS + j, n);
+}
+
 static void ruffle_strand(const struct ruffle_job *job, uint32_t i, struct picks *picks)
 {
     const struct groom_ruffle_options *o = job->options;
-    struct groom_random_key key = {o->seed, o->stream};
-    uint32_t n = elements_of(job->in, i), group = group_of(job, i), block[4], drawn = UINT32_MAX;
+    struct strand_draws draws = {.job = job, .key = {o->seed, o->stream}, .strand = i, .drawn = UINT32_MAX};
+    uint32_t n = elements_of(job->in, i), group = group_of(job, i);
     const uint32_t *members = job->member + job->first[group];
     for (uint32_t j = o->match_elements; j < n; j++) {
-        if (drawn != j / 4)
-            groom_random_block(key, i, drawn = j / 4, block);
-        if ((block[j % 4] + 0.5) * 0x1p-32 >= o->rho)
+        if (draw_chance(&draws, j) >= o->rho)
             continue;
-        uint32_t donor = members[groom_random_below(key, i, DONOR_DRAWS + j, long_enough(job, group, j))];
+        uint32_t donor = members[draw_below(&draws, j, long_enough(job, group, j))];
         if (donor != i)
             add_pick(job, picks, i, donor, j);
     }
@@ -201,13 +224,12 @@ static groom_status check_options(const struct groom_superhelices *h, const stru
     return GROOM_OK;
 }
 
-groom_status groom_superhelices_ruffle(const struct groom_superhelices *helices,
-                                       const struct groom_ruffle_options *options,
-                                       const struct groom_context *context, struct groom_superhelices **ruffled,
-                                       struct groom_diag *diag)
+groom_status ruffle_with(const struct groom_superhelices *helices, const struct groom_ruffle_options *options,
+                         const struct ruffle_draws *draws, const struct groom_context *context,
+                         struct groom_superhelices **ruffled, struct groom_diag *diag)
 {
     const struct groom_allocator *a = memory_allocator(context);
-    struct ruffle_job job = {.in = helices, .options = options, .allocator = a,
+    struct ruffle_job job = {.in = helices, .options = options, .draws = draws, .allocator = a,
                              .n_groups = options->group ? options->n_groups : 1};
     size_t n = helices->n_strands, scratch = (size_t)helices->n_elements + n + 2;
     groom_status st = check_options(helices, options, diag);
@@ -234,4 +256,12 @@ out:
     memory_release(a, job.member, n, sizeof *job.member);
     memory_release(a, job.phase, n, sizeof *job.phase);
     return st;
+}
+
+groom_status groom_superhelices_ruffle(const struct groom_superhelices *helices,
+                                       const struct groom_ruffle_options *options,
+                                       const struct groom_context *context, struct groom_superhelices **ruffled,
+                                       struct groom_diag *diag)
+{
+    return ruffle_with(helices, options, NULL, context, ruffled, diag);
 }

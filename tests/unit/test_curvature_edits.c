@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "curvature/ruffle.h"
 #include "tests/support/superhelix.h"
 #include "tests/support/test.h"
 
@@ -59,6 +60,63 @@ static struct groom_superhelices *ruffle(const struct groom_superhelices *h, con
     ck_ok(groom_superhelices_check(out, NULL));
     return out;
 }
+
+/* The generator of the vectors: splitmix64 over seed, strand, element, use. */
+static double vector_draw(void *user, uint32_t strand, uint32_t element, enum ruffle_use use)
+{
+    const uint64_t words[4] = {*(const uint64_t *)user, strand, element, use == RUFFLE_DONOR};
+    uint64_t h = 0;
+    for (int k = 0; k < 4; k++) {
+        h = (h ^ words[k]) + 0x9E3779B97F4A7C15u;
+        h = (h ^ h >> 30) * 0xBF58476D1CE4E5B9u;
+        h = (h ^ h >> 27) * 0x94D049BB133111EBu;
+        h ^= h >> 31;
+    }
+    return (double)(h >> 11) * 0x1p-53;
+}
+
+/* Strands whose elements tell by their length whose they are. */
+static struct groom_superhelices *marked(uint32_t n_strands, uint32_t n_elements)
+{
+    struct groom_superhelices *h = superhelix_coils(n_strands, n_elements, 3, 0);
+    for (uint32_t i = 0; i < n_strands; i++)
+        for (uint32_t j = 0; j < n_elements; j++)
+            h->length[i * n_elements + j] = 0.001 * (i + 1);
+    return h;
+}
+
+START_TEST(ruffling_with_the_vectors_numbers_takes_the_vectors_elements)
+{
+    struct cJSON *json = vectors_load("superhelix-primitives.json");
+    if (!json)
+        return;
+    const struct cJSON *object = vectors_get(json, "ruffle"), *rows = vectors_get(object, "source_strand");
+    uint32_t n = (uint32_t)vectors_number(object, "S"), m = (uint32_t)vectors_number(object, "N");
+    uint64_t seed = (uint64_t)vectors_number(object, "seed");
+    double *number = calloc(n + m, sizeof *number);
+    uint32_t *group = calloc(n, sizeof *group), n_groups = 0;
+    vectors_read(vectors_get(object, "group"), number, n);
+    for (uint32_t i = 0; i < n; i++) {
+        group[i] = (uint32_t)number[i];
+        n_groups = group[i] >= n_groups ? group[i] + 1 : n_groups;
+    }
+    struct groom_ruffle_options o = {.rho = vectors_number(object, "rho"), .blend = 1.0, .group = group, .n_groups = n_groups,
+                                     .match_elements = (uint32_t)vectors_number(object, "Nm")};
+    const struct ruffle_draws draws = {vector_draw, &seed};
+    ck_assert_double_eq_tol(vector_draw(&seed, 0, o.match_elements, RUFFLE_CHANCE), vectors_number(object, "u00"), 1e-16);
+    struct groom_superhelices *h = marked(n, m), *out;
+    ck_ok(ruffle_with(h, &o, &draws, NULL, &out, NULL));
+    for (uint32_t i = 0; i < n; i++) {
+        vectors_read(cJSON_GetArrayItem(rows, (int)i), number, m);
+        for (uint32_t j = 0; j < m; j++)
+            ck_assert_msg(fabs(out->length[i * m + j] - 0.001 * (number[j] + 1)) < 1e-9, "strand %u, element %u", i, j);
+    }
+    groom_superhelices_destroy(h);
+    groom_superhelices_destroy(out);
+    free(number), free(group);
+    cJSON_Delete(json);
+}
+END_TEST
 
 START_TEST(rho_0_and_blend_0_change_nothing)
 {
@@ -382,7 +440,7 @@ START_TEST(blends_and_scales_have_the_same_bits_for_any_pool)
 }
 END_TEST
 
-TEST_SUITE("curvature_edits", a_turned_gauge_is_the_same_curve_and_is_found, rho_0_and_blend_0_change_nothing,
+TEST_SUITE("curvature_edits", ruffling_with_the_vectors_numbers_takes_the_vectors_elements, a_turned_gauge_is_the_same_curve_and_is_found, rho_0_and_blend_0_change_nothing,
            elements_come_from_the_group_with_the_same_index_and_the_asked_chance,
            short_strands_give_only_what_they_have, another_seed_gives_another_head_and_the_same_one_the_same,
            ruffling_refuses_what_is_not_a_chance_or_a_group, the_ends_of_a_blend_are_the_two_grooms,

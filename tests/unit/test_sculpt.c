@@ -81,6 +81,52 @@ static void check_location(const struct cJSON *object, struct case_data *d)
 START_TEST(anchors_lie_on_the_elements_of_the_vectors) { each_case(check_location); }
 END_TEST
 
+/* The control points of q against those of the vectors, within `tolerance`. */
+static void compare_control_points(const struct cJSON *object, struct case_data *d, const double (*q)[3], const char *name,
+                                   double tolerance)
+{
+    double(*want)[3] = calloc(d->m, sizeof *want);
+    struct chain_state *junction = calloc(d->n + 1, sizeof *junction);
+    vectors_read(vectors_get(object, name), want[0], 3 * (size_t)d->m);
+    energy_junctions(&d->problem.chain, q, junction);
+    for (uint32_t k = 0; k < d->m; k++) {
+        uint32_t j = d->located[k].element;
+        vec3 got = chain_point(junction[j], vec_of(q[j]), d->located[k].s);
+        double miss = sqrt(pow(got.x - want[k][0], 2) + pow(got.y - want[k][1], 2) + pow(got.z - want[k][2], 2));
+        ck_assert_msg(miss <= tolerance, "%s, %s[%u]: %.3g off", d->name, name, k, miss);
+    }
+    free(want), free(junction);
+}
+
+static void check_control_points(const struct cJSON *object, struct case_data *d)
+{
+    compare_control_points(object, d, d->problem.chain.q, "control_points", 1e-10);
+}
+
+START_TEST(control_points_meet_the_vectors) { each_case(check_control_points); }
+END_TEST
+
+/* Where the last element begins. */
+static void check_junction(const struct cJSON *object, struct case_data *d)
+{
+    struct chain_state *junction = calloc(d->n + 1, sizeof *junction), *last = &junction[d->n];
+    double p[3], rows[3][3], got[3];
+    vectors_read(vectors_get(object, "junction_last"), p, 3);
+    vectors_read(vectors_get(object, "frame_last_rows"), rows[0], 9);
+    energy_junctions(&d->problem.chain, d->problem.chain.q, junction);
+    vec_store(last->p, got);
+    const double(*columns)[3] = (const double(*)[3])&last->F;
+    for (int r = 0; r < 3; r++) {
+        ck_assert_msg(fabs(got[r] - p[r]) <= 1e-10, "%s: junction %g, not %g", d->name, got[r], p[r]);
+        for (int c = 0; c < 3; c++)
+            ck_assert_msg(fabs(columns[c][r] - rows[r][c]) <= 1e-10, "%s: frame %d %d", d->name, r, c);
+    }
+    free(junction);
+}
+
+START_TEST(the_last_junction_meets_the_vectors) { each_case(check_junction); }
+END_TEST
+
 static void check_jacobian(const struct cJSON *object, struct case_data *d)
 {
     struct chain_state *junction = calloc(d->n + 1, sizeof *junction);
@@ -150,6 +196,8 @@ static void check_minimum(const struct cJSON *object, struct case_data *d)
     ck_assert_double_eq_tol(energy_value(&d->problem, (const double(*)[3])h->q, NULL), outcome.energy_after,
                             1e-9 * outcome.energy_after + 1e-15);
     ck_assert_mem_eq(h->length, d->helices->length, d->n * sizeof *h->length);
+    if (vectors_number(object, "agree") >= 3) /* one minimum: its points too, as well as its energy tells them */
+        compare_control_points(object, d, (const double(*)[3])h->q, "control_points_min", 1e-3 * sqrt(want) + 1e-4);
     groom_superhelices_destroy(h);
 }
 
@@ -383,7 +431,8 @@ START_TEST(a_sculpt_can_be_cancelled)
 }
 END_TEST
 
-TEST_SUITE("sculpt", anchors_lie_on_the_elements_of_the_vectors, jacobian_blocks_meet_the_vectors,
+TEST_SUITE("sculpt", anchors_lie_on_the_elements_of_the_vectors, control_points_meet_the_vectors,
+           the_last_junction_meets_the_vectors, jacobian_blocks_meet_the_vectors,
            energies_and_gradients_meet_the_vectors, the_solver_reaches_the_minima_of_the_vectors,
            the_gradient_agrees_with_finite_differences,
            strands_without_anchors_are_left_alone_and_others_move_nearer,

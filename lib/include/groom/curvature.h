@@ -6,7 +6,9 @@
  * Omega = F q, so that curvature q_1 turns about u and q_2 about v; |(q_1, q_2)| is the curve's
  * curvature and the twist is its torsion. q does not change when the strand is moved or turned.
  *
- * Lengths are metres (q: 1/metre), double precision. Every function gives the same bits for any
+ * Lengths are metres (q: 1/metre), double precision throughout: there is no single-precision solver and so no
+ * single-precision gradient; float32 is what vertices are read and written as. tests/unit/test_sculpt.c holds
+ * the gradient of Eq. 15 against finite differences and the vectors. Every function gives the same bits for any
  * pool. Numbers that are not finite are refused with GROOM_EINVAL before anything is written. */
 #ifndef GROOM_CURVATURE_H
 #define GROOM_CURVATURE_H
