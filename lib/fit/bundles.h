@@ -6,13 +6,13 @@
 
 /* Strands of one operator guide share its curl and close in on it; nearness on the scalp alone does not tell
  * which do. Strands of a bundle differ by their roots, less towards the tip:
- *     x_ij - mean_bj = rest_j (root_i - root_b) + noise
- * and by their lengths, which say nothing of bundles. Clusters of strands are merged, the pair first that
- * this explains best (Ward 1963), until there are as many bundles as operator guides; then strands go where
- * they, with their neighbours on the scalp, are explained best. The guide of a bundle's middle cluster
- * becomes its operator guide.
+ *     x_ij - x_kj = rest_j (root_i - root_k) + noise
+ * and by their lengths, which say nothing of bundles. Within a bundle neighbours are much more alike than
+ * across its border, even where its far ends are not: strands are merged across borders of least difference
+ * (fit/regions.h) until there are as many bundles as operator guides. The guide nearest to the middle of a
+ * bundle becomes its operator guide.
  *
- * Fills operator_guide and operator_guide_of of the fit's groom, which has as many guides as there are clusters.
+ * Fills operator_guide and operator_guide_of of the fit's groom.
  * returns  GROOM_OK, GROOM_ENOMEM
  * threads  same bits for any pool */
 GROOM_MUST_CHECK groom_status bundles_find(struct groom_fit *fit, const struct groom_context *context,

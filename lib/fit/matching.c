@@ -170,6 +170,7 @@ static groom_status allocate(struct matching *matching, const struct groom_conte
         return groom_fail(diag, GROOM_ENOMEM, "no memory for a sample of %u strands", n);
     matching->plan.base = (const float (*)[3])matching->base;
     matching->plan.guide = (const float (*)[3])matching->guide;
+    matching->plan.bundle = matching->groom->operator_guide_of;
     return GROOM_OK;
 }
 

@@ -56,8 +56,8 @@ static void list_members(struct mean_strands *mean)
     mean->first[0] = 0;
 }
 
-static groom_status init(struct mean_strands *mean, const struct groom_fit *fit, double trust,
-                         const struct groom_context *context, struct groom_diag *diag)
+static groom_status init(struct mean_strands *mean, const struct groom_fit *fit, const struct groom_context *context,
+                         struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     double profile = total_profile(fit->groom);
@@ -72,7 +72,7 @@ static groom_status init(struct mean_strands *mean, const struct groom_fit *fit,
     if (!mean->part || !mean->origin || !mean->rest || !mean->first || !mean->member)
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the mean of %u strands", fit->n);
     for (uint32_t j = 0; j < fit->m; j++)
-        mean->rest[j] = 1 - trust * (1 - exp(-profile * j / (fit->m - 1)));
+        mean->rest[j] = exp(-profile * j / (fit->m - 1));
     fill_parts(mean, fit, profile > 0);
     list_members(mean);
     return GROOM_OK;
@@ -81,7 +81,7 @@ static groom_status init(struct mean_strands *mean, const struct groom_fit *fit,
 groom_status mean_strands_init(struct mean_strands *mean, const struct groom_fit *fit,
                                const struct groom_context *context, struct groom_diag *diag)
 {
-    return init(mean, fit, (double)fit->groom->n_operator_guides / fit->n_guides, context, diag);
+    return init(mean, fit, context, diag);
 }
 
 void mean_strands_finish(struct mean_strands *mean)
@@ -218,7 +218,7 @@ groom_status mean_strands_init_known(struct mean_strands *mean, const struct gro
     size_t n_shape = (size_t)fit->n_guides * fit->m;
     double (*shape)[3] = memory_array(allocator, n_shape, sizeof *shape);
     double *error = memory_array(allocator, fit->n, 2 * sizeof *error);
-    groom_status st = init(mean, fit, 1, context, diag);
+    groom_status st = init(mean, fit, context, diag);
     if (st != GROOM_OK)
         goto out;
     mean->given = memory_array(allocator, (size_t)fit->n * fit->m, sizeof *mean->given);

@@ -4,10 +4,8 @@
  * Scale, bend, curl and frizz keep a strand where it is on average; clump has no random numbers:
  *     E[x_ij] = rest_j (r_i + sum_k w_ik s_kj) + clump_j (r_h + s_hj),  s_gj = g_j - g_1,
  * with the strand's root r_i, its guides k, its operator guide h, and
- *     clump_j = 1 - rest_j = (n_gop / n_g) (1 - exp(-a v_j)),  v_j = j / (m - 1),  a: all clumps' profiles.
- * Whom a strand of the target follows is a guess, the rougher the fewer operator guides there are, and
- * strands that close in on one whom nobody knows stay where they are on average: hence the factor, which
- * is 1 where all guides are operator guides. The expectation is linear in the shapes s of the guides,
+ *     clump_j = 1 - rest_j = 1 - exp(-a v_j),  v_j = j / (m - 1),  a: all clumps' profiles.
+ * The expectation is linear in the shapes s of the guides,
  * vertex by vertex and coordinate by coordinate. (A bend of 0.8 radians really takes 6 % of the length
  * away on average; that is left to the guides.)
  */

@@ -23,7 +23,8 @@
 #define POWER_FLOOR 1e-8        /* of squared segments: a wobble of 1e-4 rad */
 #define DISTANCE_FLOOR 1e-8     /* of squared lengths */
 #define SHRINKAGE 0.1           /* of correlations */
-#define GUIDE_FLOOR 3.0         /* times the floor, for statistics that lean on base strands and operator guides */
+#define GUIDE_FLOOR 10.0               /* times the floor, for statistics that lean on base strands and operator guides: they only
+                                 keep clumps from where nothing else speaks */
 
 /* --- the plan ------------------------------------------------------------------------ */
 
@@ -79,7 +80,7 @@ groom_status moments_plan_init(struct moments_plan *plan, const struct groom_con
         values[i] = full_length(plan->base + (size_t)i * m, m);
     double length = fmax(median(values, 2 * n), 1e-9);
     for (uint32_t i = 0; i < n; i++)
-        values[i] = squared(plan->base[(size_t)i * m + middle], plan->base[(size_t)(n + i) * m + middle]);
+        values[i] = squared(plan->base[(size_t)i * m], plan->base[(size_t)(n + i) * m]);
     plan->apart = fmax(median(values, n), DISTANCE_FLOOR * length * length);
     for (uint32_t i = 0; i < 2 * n; i++)
         values[i] = squared(plan->base[(size_t)i * m + middle], plan->guide[(size_t)i * m + middle]);
@@ -286,18 +287,17 @@ static void measure_lengths(const float (*a)[3], const float (*b)[3], const floa
                             const float (*base_b)[3], uint32_t m, float *out)
 {
     double least = 1e-9;
-    double coarse_a = log(fmax(coarse_length(a, m), least) / fmax(coarse_length(base_a, m), least));
-    double coarse_b = log(fmax(coarse_length(b, m), least) / fmax(coarse_length(base_b, m), least));
-    double full_a = log(fmax(full_length(a, m), least) / fmax(full_length(base_a, m), least));
-    double full_b = log(fmax(full_length(b, m), least) / fmax(full_length(base_b, m), least));
-    out[MOMENTS_LENGTH] = (float)(0.5 * (coarse_a + coarse_b));
+    double coarse_a = log(fmax(coarse_length(a, m), least)), coarse_b = log(fmax(coarse_length(b, m), least));
+    double full_a = log(fmax(full_length(a, m), least)), full_b = log(fmax(full_length(b, m), least));
+    double coarse = log(fmax(coarse_length(base_a, m), least)) + log(fmax(coarse_length(base_b, m), least));
+    double full = log(fmax(full_length(base_a, m), least)) + log(fmax(full_length(base_b, m), least));
+    out[MOMENTS_LENGTH] = (float)(0.5 * (coarse_a + coarse_b - coarse));
     out[MOMENTS_LENGTH + 1] = (float)fabs(coarse_a - coarse_b);
-    out[MOMENTS_LENGTH + 2] = (float)(0.5 * (full_a + full_b));
+    out[MOMENTS_LENGTH + 2] = (float)(0.5 * (full_a + full_b - full));
     out[MOMENTS_LENGTH + 3] = (float)fabs(full_a - full_b);
 }
 
-/* How much of the distance from q to p is left of that from base_q to base_p: about 1 - a' under a
- * clump. `scale` keeps it small where those are close. */
+/* How much of the distance from q to p is left of that from base_q to base_p: falls under a clump. `scale` keeps it small where those are close. */
 static double share_left(const float p[3], const float q[3], const float base_p[3], const float base_q[3], double scale)
 {
     double dot = 0, square = 0;
@@ -309,20 +309,7 @@ static double share_left(const float p[3], const float q[3], const float base_p[
     return dot / (square + scale);
 }
 
-/* Where a strand is at a place against its base strand: as a part of the base strand's chord, and off it. */
-static double off_base(const float x[3], const float base[3], const float root[3], double length, double aside[3])
-{
-    double dot = 0, square = 1e-6 * length * length;
-    for (int c = 0; c < 3; c++) {
-        double chord = (double)base[c] - root[c];
-        dot += ((double)x[c] - base[c]) * chord;
-        square += chord * chord;
-    }
-    for (int c = 0; c < 3; c++)
-        aside[c] = (double)x[c] - base[c] - dot / square * ((double)base[c] - root[c]);
-    return dot / square;
-}
-
+/* How differently two strands have gone from their roots: as a part of the way, and off it. */
 static void measure_stretch(const struct moments_plan *plan, uint32_t pair, const float (*points)[3], double length,
                             float *out)
 {
@@ -330,13 +317,18 @@ static void measure_stretch(const struct moments_plan *plan, uint32_t pair, cons
     size_t first_a = (size_t)pair * m, first_b = (size_t)(plan->n_pairs + pair) * m;
     for (uint32_t p = 0; p < MOMENTS_PLACES; p++) {
         size_t a = first_a + place(p, m), b = first_b + place(p, m);
-        double aside_a[3], aside_b[3], square = DISTANCE_FLOOR * length * length;
-        double along_a = off_base(points[a], plan->base[a], plan->base[first_a], length, aside_a);
-        double along_b = off_base(points[b], plan->base[b], plan->base[first_b], length, aside_b);
+        double way[3], apart[3], dot = 0, square = 1e-6 * length * length, aside = DISTANCE_FLOOR * length * length;
+        for (int c = 0; c < 3; c++) {
+            double x = (double)points[a][c] - points[first_a][c], y = (double)points[b][c] - points[first_b][c];
+            way[c] = 0.5 * (x + y);
+            apart[c] = x - y;
+            dot += way[c] * apart[c];
+            square += way[c] * way[c];
+        }
         for (int c = 0; c < 3; c++)
-            square += (aside_a[c] - aside_b[c]) * (aside_a[c] - aside_b[c]);
-        out[MOMENTS_STRETCH + p] = (float)fmin(fabs(along_a - along_b), 2);
-        out[MOMENTS_ASIDE + p] = (float)log(square);
+            aside += pow(apart[c] - dot / square * way[c], 2);
+        out[MOMENTS_STRETCH + p] = (float)fmin(fabs(dot / square), 2);
+        out[MOMENTS_ASIDE + p] = (float)log(aside);
     }
 }
 
@@ -346,11 +338,12 @@ static void measure_distances(const struct moments_plan *plan, uint32_t pair, co
     uint32_t m = plan->m;
     size_t first_a = (size_t)pair * m, first_b = (size_t)(plan->n_pairs + pair) * m;
     double floor = DISTANCE_FLOOR * length * length;
+    int distance = plan->bundle[pair] == plan->bundle[plan->n_pairs + pair] ? MOMENTS_DISTANCE : MOMENTS_BORDER;
     for (uint32_t p = 0; p < MOMENTS_PLACES; p++) {
         size_t a = first_a + place(p, m), b = first_b + place(p, m);
         const float *x = points[a], *y = points[b], *g = plan->guide[a], *h = plan->guide[b];
-        out[MOMENTS_DISTANCE + p] = (float)log(squared(x, y) + floor);
-        out[MOMENTS_ALONG + p] = (float)share_left(x, y, plan->base[a], plan->base[b], plan->apart);
+        out[distance + p] = (float)log(squared(x, y) + floor);
+        out[MOMENTS_ALONG + p] = (float)share_left(x, y, points[first_a], points[first_b], plan->apart);
         out[MOMENTS_GUIDE_DISTANCE + p] = (float)(0.5 * (log(squared(x, g) + floor) + log(squared(y, h) + floor)));
         out[MOMENTS_GUIDE_ALONG + p] = (float)(0.5 * (share_left(x, g, plan->base[a], g, plan->off_guide) +
                                                       share_left(y, h, plan->base[b], h, plan->off_guide)));
@@ -424,7 +417,7 @@ static int is_deviation(int f)
            (f >= MOMENTS_STRETCH && f < MOMENTS_ASIDE);
 }
 
-static int leans_on_guides(int f) { return f >= MOMENTS_ALONG || f == MOMENTS_LENGTH || f == MOMENTS_LENGTH + 2; }
+static int leans_on_guides(int f) { return f >= MOMENTS_GUIDE_DISTANCE || f == MOMENTS_LENGTH || f == MOMENTS_LENGTH + 2; }
 
 /* Variances of the means from sums over bundles; values become deviations of standard size. */
 static void standardize(float *values, uint32_t n_pairs, const uint32_t *bundle, uint32_t n_bundles,

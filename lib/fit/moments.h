@@ -2,7 +2,7 @@
  *
  * The losses of Chang et al. 2025, Section 5.5, hardly see some parameters (their notes: scale and
  * clump) and mix up others. What is compared here instead are means, over pairs of neighbouring
- * strands, of some 180 numbers a pair, each of which answers to few parameters:
+ * strands, of some 190 numbers a pair, each of which answers to few parameters:
  *
  *   spectra     logarithms of the power of a strand's segments at fixed turns per metre of its base
  *               strand, over the whole strand and over thirds: curl and frizz, and where they set in
@@ -12,11 +12,15 @@
  *               difference within pairs: random frequency
  *   phase       how far the strongest wave runs ahead of its frequency from window to window: the frequency of
  *               one strand, finer than its spectrum tells, and how it differs between strands
- *   lengths     against the base strand, and their difference within pairs: scale
- *   stretch     how differently the strands of a pair have left their base strands, at six places: along
- *               them (scale) and aside (bend); what is wrong with the guides cancels
- *   distances   between the strands of a pair at six places, in size and along the distance of their
- *               base strands; the same to the operator guide: clump
+ *   lengths     and their difference within pairs: scale
+ *   stretch     how differently the strands of a pair have gone from their roots, at six places: along their
+ *               way (scale) and aside (bend)
+ *   distances   between the strands of a pair at six places, apart for pairs of one operator guide and of two,
+ *               and along the distance of their roots: clump; the same to the operator guide, which hardly
+ *               counts
+ *
+ * Differences within pairs do not lean on the guides: what is wrong with these is much the same for neighbours,
+ * and cancels.
  *
  * Logarithms and absolute deviations keep a few odd strands from deciding. Nothing depends on the unit. */
 #ifndef FIT_MOMENTS_H
@@ -43,7 +47,8 @@ enum moments_index {
     MOMENTS_PHASE = MOMENTS_CENTROID + 3,
     MOMENTS_LENGTH = MOMENTS_PHASE + 3,
     MOMENTS_DISTANCE = MOMENTS_LENGTH + 4,
-    MOMENTS_STRETCH = MOMENTS_DISTANCE + MOMENTS_PLACES,
+    MOMENTS_BORDER = MOMENTS_DISTANCE + MOMENTS_PLACES,
+    MOMENTS_STRETCH = MOMENTS_BORDER + MOMENTS_PLACES,
     MOMENTS_ASIDE = MOMENTS_STRETCH + MOMENTS_PLACES,
     MOMENTS_ALONG = MOMENTS_ASIDE + MOMENTS_PLACES,
     MOMENTS_GUIDE_DISTANCE = MOMENTS_ALONG + MOMENTS_PLACES,
@@ -56,8 +61,9 @@ struct moments_plan {
     uint32_t n_pairs, m;        /* m at most MOMENTS_MOST_VERTICES */
     const float (*base)[3];   /* [2 n_pairs][m] strands without operators */
     const float (*guide)[3];  /* [2 n_pairs][m] their operator guides */
+    const uint32_t *bundle;   /* [2 n_pairs] which these are */
     double frequency[MOMENTS_FREQUENCIES]; /* turns per metre, or of whatever unit the points have */
-    double apart, off_guide;  /* median squared distances of base strands: of pairs, from operator guides */
+    double apart, off_guide;  /* median squared distances: of pairs' roots, of base strands from operator guides */
     double level[MOMENTS_FREQUENCIES];     /* of the target's spectrum, from which spread is measured */
     double centroid, phase;                /* of the target */
     uint32_t peak;                         /* which frequency is the target's strongest */

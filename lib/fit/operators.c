@@ -19,6 +19,7 @@
 #include "fit/gradient_determinant.h"
 #include "fit/loss_determinant.h"
 #include "fit/matching.h"
+#include "fit/operators.h"
 #include "fit/paper_operators.h"
 #include "groom/strands.h"
 #include "quality/loss_wasserstein.h"
@@ -288,6 +289,23 @@ static groom_status refine(struct groom_fit *fit, struct matching *matching, dou
     }
 out:
     memory_release(allocator, jacobian, MOST_PARAMETERS, MOMENTS_COUNT * sizeof *jacobian);
+    return st;
+}
+
+groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, const struct groom_context *context,
+                              struct groom_diag *diag)
+{
+    struct matching *matching;
+    double square;
+    int ended = 0;
+    if (count_unknowns(fit) == 0)
+        return GROOM_OK;
+    groom_status st = matching_create(fit, fit->options.stages.operators.pairs, FLOOR_LAST, context, &matching, diag);
+    if (st != GROOM_OK)
+        return st;
+    for (uint32_t k = 0; st == GROOM_OK && !ended && k < n_steps; k++)
+        st = refine(fit, matching, &square, &ended, context, diag);
+    matching_destroy(matching);
     return st;
 }
 

@@ -20,6 +20,7 @@
 #include "fit/gather.h"
 #include "fit/guides.h"
 #include "fit/loss_strands.h"
+#include "fit/operators.h"
 #include "fit/paper_randoms.h"
 #include "fit/random_search.h"
 
@@ -30,7 +31,7 @@
 #define STEP_WORK 1200000    /* strands times values of one step: about a second */
 #define MOST_PASSES 256
 #define CANDIDATES 8         /* operator guides near a strand that it may follow */
-#define GAIN 0.1f            /* share of its error that another one must be better by */
+#define GAIN 0.3f            /* share of its error that another one must be better by */
 #define CURL_VALUES 256      /* about: values of a curl's numbers that are tried */
 #define POLISH_STEPS 2       /* in the last round; 1 in others */
 #define POLISH_VALUES 48     /* about: evaluations of them */
@@ -38,7 +39,8 @@
 /* --- the row of passes ------------------------------------------------------------------------- */
 
 /* What is looked for: which operator guide each strand follows, the numbers of strands in one operator,
- * those of operator guides, the last digits of all that a strand has, or the guides that go with them. */
+ * those of operator guides, the last digits of all that a strand has, or the guides that go with them and the
+ * operators' parameters for these guides. */
 struct pass {
     enum { FOLLOW, STRANDS, CURLS, POLISH, RESHAPE } kind;
     uint32_t round;
@@ -72,7 +74,7 @@ static uint32_t list_numbers(const struct groom *groom, uint32_t round, int per_
 }
 
 /* In a round: what strands share, then whom they follow in it, then what each has of its own; between rounds,
- * guides for these numbers: those before were for any. */
+ * guides for these numbers, for those before were for any, and parameters for the guides. */
 static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST_PASSES])
 {
     uint32_t n = 0, n_rounds = fit->options.stages.randoms.rounds;
@@ -274,6 +276,8 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
 static groom_status reshape_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     groom_status st = guides_refine(fit, context, diag);
+    if (st == GROOM_OK)
+        st = operators_refine(fit, fit->options.stages.randoms.refinements, context, diag);
     if (st == GROOM_OK)
         fit->iteration++;
     return st;

@@ -268,7 +268,9 @@ static void statistics(double radius, double turns, double unit, double mean[MOM
 {
     enum { N = 8, M = 60 };
     static float base[N * M][3], points[N * M][3], values[N / 2 * MOMENTS_COUNT];
-    struct moments_plan plan = {.n_pairs = N / 2, .m = M, .base = (const float (*)[3])base, .guide = (const float (*)[3])base};
+    static const uint32_t bundle[N] = {0, 1, 0, 1, 0, 2, 0, 2}; /* pairs of one, of two, ... */
+    struct moments_plan plan = {.n_pairs = N / 2, .m = M, .base = (const float (*)[3])base,
+                                .guide = (const float (*)[3])base, .bundle = bundle};
     coils(N, M, 0, 0, unit, base);
     coils(N, M, radius, turns, unit, points);
     ck_ok(moments_plan_init(&plan, NULL, NULL));

@@ -1,9 +1,10 @@
-/* K-means, K-medoids and smoothing: each against brute force or what is known of it. */
+/* K-means, K-medoids, smoothing, regions: each against brute force or what is known of it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "fit/medoids.h"
+#include "fit/regions.h"
 #include "fit/simplex.h"
 #include "fit/smooth.h"
 #include "geometry/kmeans.h"
@@ -466,6 +467,72 @@ START_TEST(columns_that_are_alike_are_survived)
 }
 END_TEST
 
+/* --- regions ------------------------------------------------------------------------ */
+
+enum { SIDE = 20 };
+
+/* Of four unequal parts of a square. */
+static uint32_t part_of(uint32_t x, uint32_t y) { return (x >= 12) + 2 * (y >= 14); }
+
+/* Edges of a grid: rugged, and on average eight times as costly from part to part. */
+static uint32_t grid(struct region_edge *edge)
+{
+    struct groom_random_key noise = {7, 3};
+    uint32_t n = 0;
+    for (uint32_t y = 0; y < SIDE; y++)
+        for (uint32_t x = 0; x < SIDE; x++)
+            for (int way = 0; way < 2; way++) {
+                uint32_t x2 = x + (way == 0), y2 = y + (way == 1);
+                if (x2 == SIDE || y2 == SIDE)
+                    continue;
+                double cost = part_of(x, y) == part_of(x2, y2) ? 1 : 8;
+                edge[n] = (struct region_edge){y * SIDE + x, y2 * SIDE + x2, cost * (0.4 + 1.2 * groom_random_uniform(noise, n, 0))};
+                n++;
+            }
+    return n;
+}
+
+START_TEST(regions_end_where_neighbours_are_unlike)
+{
+    static struct region_edge edge[2 * SIDE * SIDE];
+    uint32_t region[SIDE * SIDE], of_part[4], n = grid(edge);
+    ck_ok(regions_merge(edge, n, SIDE * SIDE, 4, region, memory_allocator(NULL)));
+    for (uint32_t p = 0; p < 4; p++)
+        of_part[p] = region[(p / 2) * 16 * SIDE + (p % 2) * 16];
+    for (uint32_t k = 0; k < SIDE * SIDE; k++)
+        ck_assert_uint_eq(region[k], of_part[part_of(k % SIDE, k / SIDE)]);
+    ck_assert_uint_eq((1u << of_part[0]) | (1u << of_part[1]) | (1u << of_part[2]) | (1u << of_part[3]), 15);
+}
+END_TEST
+
+START_TEST(islands_beyond_the_number_of_regions_are_joined)
+{
+    const struct region_edge edge[] = {{0, 1, 1}, {2, 3, 1}, {4, 5, 1}, {6, 6, 0}};
+    uint32_t region[7];
+    ck_ok(regions_merge(edge, 4, 7, 2, region, memory_allocator(NULL)));
+    ck_assert_uint_eq(region[0], region[1]);
+    for (uint32_t k = 2; k < 7; k++)
+        ck_assert_uint_eq(region[k], 1);
+}
+END_TEST
+
+START_TEST(regions_survive_each_failing_allocation)
+{
+    static struct region_edge edge[2 * SIDE * SIDE];
+    uint32_t region[SIDE * SIDE], n = grid(edge);
+    struct test_failing_allocator state;
+    struct groom_allocator allocator;
+    size_t fail_at = 0;
+    for (groom_status st = GROOM_ENOMEM; st != GROOM_OK; fail_at++) {
+        test_failing_allocator_init(&state, fail_at, &allocator);
+        st = regions_merge(edge, n, SIDE * SIDE, 4, region, &allocator);
+        ck_assert(st == GROOM_OK || st == GROOM_ENOMEM);
+        ck_assert_uint_eq(state.outstanding_bytes, 0);
+    }
+    ck_assert_uint_gt(fail_at, 10);
+}
+END_TEST
+
 TEST_SUITE("fit_parts", seeds_are_different_rows_and_cover_separate_blobs, seeding_stops_where_no_place_is_left,
            an_iteration_is_nearest_centre_then_mean,
            the_objective_never_increases_and_no_cluster_is_empty,
@@ -475,4 +542,6 @@ TEST_SUITE("fit_parts", seeds_are_different_rows_and_cover_separate_blobs, seedi
            medoids_are_different_members_in_order, no_single_swap_improves_medoids, one_medoid_is_the_best_one,
            all_rows_or_rows_at_one_place_may_be_medoids, medoids_survive_each_failing_allocation,
            simplex_weights_are_the_minimum_on_a_fine_grid, no_exchange_between_simplex_weights_is_an_improvement,
-           a_limited_support_is_kept_and_better_than_one, columns_that_are_alike_are_survived)
+           a_limited_support_is_kept_and_better_than_one, columns_that_are_alike_are_survived,
+           regions_end_where_neighbours_are_unlike, islands_beyond_the_number_of_regions_are_joined,
+           regions_survive_each_failing_allocation)

@@ -95,6 +95,7 @@ static struct groom_fit *fit_of(const struct groom_sample *sample, uint32_t roun
     options.operator_guides = sample->truth->n_operator_guides;
     options.seed = 77;
     options.stages.randoms.rounds = rounds;
+    options.stages.randoms.refinements = 0; /* parameters are the truth's: nothing to refine */
     struct groom_fit *fit = guides_fit(sample, &options, "instance_weights", NULL);
     struct groom *groom;
     ck_ok(groom_clone(sample->truth, NULL, &groom, NULL));
@@ -197,6 +198,8 @@ static void same_grooms(const struct groom *a, const struct groom *b)
         for (uint32_t r = 0; r < groom_operator_random_arrays(a->operators[o].type); r++)
             ck_assert_mem_eq(a->operators[o].random[r], b->operators[o].random[r],
                              (groom_operator_random_per_guide(a->operators[o].type) ? a->n_operator_guides : n) * sizeof(float));
+    for (uint32_t o = 0; o < a->n_operators; o++)
+        ck_assert_mem_eq(a->operators[o].parameter, b->operators[o].parameter, sizeof a->operators[o].parameter);
     ck_assert_mem_eq(a->guides, b->guides, (size_t)a->n_guides * a->n_vertices * sizeof *a->guides);
     ck_assert_mem_eq(a->instancing_weight, b->instancing_weight, n * a->n_instancing * sizeof(float));
     ck_assert_mem_eq(a->operator_guide_of, b->operator_guide_of, n * sizeof(uint32_t));
@@ -235,6 +238,7 @@ START_TEST(the_stage_can_be_interrupted_anywhere)
     struct groom_sample *sample = guides_sample(GROOM_SAMPLE_WAVY, 220, M, 3, NULL);
     struct groom_fit *whole = fit_of(sample, 2), *other = fit_of(sample, 2);
     int steps = 0;
+    whole->options.stages.randoms.refinements = other->options.stages.randoms.refinements = 1;
     finish(whole, NULL);
     for (; !groom_fit_done(other); steps++) {
         struct bytes bytes = {0};
@@ -243,6 +247,7 @@ START_TEST(the_stage_can_be_interrupted_anywhere)
         struct groom_memory_source memory;
         struct groom_source source = groom_source_from_memory(&memory, bytes.at, bytes.n);
         struct groom_fit *next = fit_of(sample, 2);
+        next->options.stages.randoms.refinements = 1;
         ck_ok(groom_fit_load(next, &source, NULL, NULL));
         groom_fit_destroy(other);
         other = next;

@@ -110,6 +110,7 @@ struct groom_fit_options {
             double lambda_x;            /* of vertices over directions: 3 */
             double hold;                /* of the instancing weights to where they are */
             double across;              /* of guides that are solved again between rounds */
+            uint32_t refinements;       /* of the operators after that */
             uint32_t iterations;        /* 3000 */
             double learning_rate;       /* 0.1 */
             double lambda_d, lambda_l;  /* Eq. 19: 2, 0.01 */
