@@ -177,6 +177,20 @@ static void check_gradient(const struct cJSON *object, struct case_data *d)
 START_TEST(energies_and_gradients_meet_the_vectors) { each_case(check_gradient); }
 END_TEST
 
+/* The curvatures at a minimum that the energy fixes: c |q - q_min|^2 is what being off costs at least. */
+static void compare_curvatures(const struct cJSON *object, const struct case_data *d, const double (*q)[3])
+{
+    double(*want)[3] = calloc(d->n, sizeof *want), square = 0.0;
+    double c = vectors_number(object, "c"), energy = vectors_number(object, "E_min");
+    vectors_read(vectors_get(object, "q_min"), want[0], 3 * (size_t)d->n);
+    for (uint32_t j = 0; j < d->n; j++)
+        for (int k = 0; k < 3; k++)
+            square += (q[j][k] - want[j][k]) * (q[j][k] - want[j][k]);
+    ck_assert_msg(square <= 1e-8 * energy / c, "%s: curvatures %.3g off, at most %.3g", d->name, sqrt(square),
+                  sqrt(1e-8 * energy / c));
+    free(want);
+}
+
 static void check_minimum(const struct cJSON *object, struct case_data *d)
 {
     struct groom_sculpt_options options = groom_sculpt_options_default();
@@ -198,6 +212,8 @@ static void check_minimum(const struct cJSON *object, struct case_data *d)
     ck_assert_mem_eq(h->length, d->helices->length, d->n * sizeof *h->length);
     if (vectors_number(object, "agree") >= 3) /* one minimum: its points too, as well as its energy tells them */
         compare_control_points(object, d, (const double(*)[3])h->q, "control_points_min", 1e-3 * sqrt(want) + 1e-4);
+    if (vectors_number(object, "agree") >= 3 && vectors_number(object, "c") > 0.0) /* without stiffness many q do */
+        compare_curvatures(object, d, (const double(*)[3])h->q);
     groom_superhelices_destroy(h);
 }
 
