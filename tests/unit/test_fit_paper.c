@@ -115,7 +115,7 @@ START_TEST(the_gradient_of_shapes_is_that_of_their_loss)
     struct groom_fit *fit = before_operators(GROOM_SAMPLE_WAVY, 150, &sample);
     struct gradient_shape *shape;
     ck_ok(gradient_shape_create(fit, NULL, &shape, NULL));
-    agrees(fit, shape_loss, shape, types, 3, 1e-3, 0.02);
+    agrees(fit, shape_loss, shape, types, 3, 3e-4, 0.02);
     gradient_shape_destroy(shape);
     groom_fit_destroy(fit);
     groom_sample_destroy(sample);
