@@ -43,7 +43,7 @@ static groom_status carry_points(const struct carrying *c, const float (*points)
     if (st == GROOM_OK) {
         struct job job = {.source = source, .target = c->target};
         for (uint32_t i = 0; i < n; i++) {
-            double p[3];
+            double p[3] = {0, 0, 0};
             (are_roots ? transfer_root : transfer_anchor)(&job, i, p);
             for (int k = 0; k < 3; k++)
                 out[i][k] = (float)p[k];
