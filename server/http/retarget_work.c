@@ -6,9 +6,9 @@
 #include <string.h>
 
 #include "proto/json_text.h"
-#include "proto/strand_stream.h"
 #include "server/grooms/retargeted.h"
 #include "server/http/handlers.h"
+#include "server/http/strand_answer.h"
 #include "server/jobs/work.h"
 
 /* The groom that the attempt's job carries. */
@@ -67,39 +67,23 @@ void work_call_groom(struct request *request)
     subject_close(&subject);
 }
 
-/* The head of the stream, and the strands behind it. */
-struct sent_strands {
-    struct response_pieces pieces; /* first: it is released by its address */
-    struct grooms_dense dense;
-    char head[STRAND_STREAM_HEAD];
-};
-
-static void release_strands(struct response_pieces *pieces)
+static void release_dense(void *user)
 {
-    struct sent_strands *sent = (struct sent_strands *)pieces;
-    grooms_dense_finish(&sent->dense);
-    free(sent);
+    grooms_dense_finish(user);
+    free(user);
 }
 
 static groom_status send_strands(struct request *request, const struct subject *subject, struct groom_diag *diag)
 {
-    struct sent_strands *sent = calloc(1, sizeof *sent);
-    if (!sent)
+    struct grooms_dense *dense = calloc(1, sizeof *dense);
+    if (!dense)
         return GROOM_ENOMEM;
-    groom_status status =
-        grooms_dense(request->service->grooms, subject->groom, subject->revision, 0, &sent->dense, diag);
-    if (status != GROOM_OK) {
-        free(sent);
-        return status;
-    }
-    const struct groom_strands *strands = sent->dense.strands;
-    strand_stream_head(strands->n_strands, strands->n_vertices, sent->head);
-    sent->pieces = (struct response_pieces){
-        {{sent->head, sizeof sent->head},
-         {strands->first, ((size_t)strands->n_strands + 1) * sizeof *strands->first},
-         {strands->points, strands->n_vertices * sizeof *strands->points}}, 3, release_strands};
-    respond_pieces(request, STRAND_STREAM_TYPE, &sent->pieces);
-    return GROOM_OK;
+    groom_status status = grooms_dense(request->service->grooms, subject->groom, subject->revision, 0, dense, diag);
+    if (status == GROOM_OK)
+        respond_strands(request, dense->strands, release_dense, dense);
+    else
+        free(dense);
+    return status;
 }
 
 void retarget_work_strands(struct request *request)

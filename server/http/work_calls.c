@@ -8,11 +8,11 @@
 #include <unistd.h>
 
 #include "proto/json_text.h"
-#include "proto/strand_stream.h"
 #include "server/blobs/blobs.h"
 #include "server/grooms/grooms.h"
 #include "server/http/handlers.h"
 #include "server/http/retarget_work.h"
+#include "server/http/strand_answer.h"
 #include "server/http/tool.h"
 #include "server/jobs/work.h"
 
@@ -169,38 +169,23 @@ void work_call_layer(struct request *request)
     store_job_finish(&job);
 }
 
-/* The head of the stream, and the memory behind it that the store of states holds. */
-struct sent_strands {
-    struct response_pieces pieces; /* first: it is released by its address */
-    struct grooms_held held;
-    char head[STRAND_STREAM_HEAD];
-};
-
-static void release_strands(struct response_pieces *pieces)
+static void release_held(void *user)
 {
-    struct sent_strands *sent = (struct sent_strands *)pieces;
-    grooms_release(&sent->held);
-    free(sent);
+    grooms_release(user);
+    free(user);
 }
 
 static groom_status send_strands(struct request *request, const struct grooms_layer_job *edit, struct groom_diag *diag)
 {
-    struct sent_strands *sent = calloc(1, sizeof *sent);
-    if (!sent)
+    struct grooms_held *held = calloc(1, sizeof *held);
+    if (!held)
         return GROOM_ENOMEM;
-    groom_status status = grooms_job_strands(request->service->grooms, edit, &sent->held, diag);
-    if (status != GROOM_OK) {
-        free(sent);
-        return status;
-    }
-    const struct groom_strands *strands = sent->held.strands;
-    strand_stream_head(strands->n_strands, strands->n_vertices, sent->head);
-    sent->pieces = (struct response_pieces){
-        {{sent->head, sizeof sent->head},
-         {strands->first, ((size_t)strands->n_strands + 1) * sizeof *strands->first},
-         {strands->points, strands->n_vertices * sizeof *strands->points}}, 3, release_strands};
-    respond_pieces(request, STRAND_STREAM_TYPE, &sent->pieces);
-    return GROOM_OK;
+    groom_status status = grooms_job_strands(request->service->grooms, edit, held, diag);
+    if (status == GROOM_OK)
+        respond_strands(request, held->strands, release_held, held);
+    else
+        free(held);
+    return status;
 }
 
 void work_call_strands(struct request *request)
