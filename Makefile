@@ -11,6 +11,7 @@
 #   make deb        build/groomd_VERSION_ARCH.deb
 #   make bench      a table of figures, and build/bench.json
 #   make real-captures  fits of real captures: pictures and reports (CAPTURES names their folder)
+#   make real-retargets  real captures on reshaped copies of their bodies: pictures before and after, and reports
 #   make asan tsan  the tests under AddressSanitizer and ThreadSanitizer
 #   make fuzz       libFuzzer on every parser, FUZZ_SECONDS each
 #   make docs-pictures  the pictures of the help (client/docs), by the project's own renderer
@@ -66,7 +67,7 @@ PROGRAM_OF_server_groomd.c = groomd
 PROGRAM_OF_server_worker_main.c = groom-worker
 PROGRAM_OF_client_groomctl_main.c = groomctl
 
-.PHONY: all setup programs lib run test unit check-all test-service soak test-cluster test-deploy docs-pictures deb bench real-captures asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
+.PHONY: all setup programs lib run test unit check-all test-service soak test-cluster test-deploy docs-pictures deb bench real-captures real-retargets asan tsan fuzz fuzz-corpus lint install clean api e2e node-packages tests
 .DEFAULT_GOAL := all
 
 all: setup
@@ -247,6 +248,10 @@ real-captures: setup
 docs-pictures: setup
 	+@$(SUBMAKE) programs node-packages
 	@BUILD=$(BUILD) node client/docs/pictures.mjs
+
+real-retargets: setup
+	+@$(SUBMAKE) programs node-packages
+	@BUILD=$(BUILD) node --test --test-reporter=spec tests/captures/retarget.mjs
 
 lint:
 	@tests/lint.sh
