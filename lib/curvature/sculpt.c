@@ -1,5 +1,5 @@
-/* Eq. 15 over many strands: anchors sorted by strand, strands in pieces through the vectorised solver,
- * the stubborn ones finished one by one. */
+/* Eq. 15 over many strands: anchors sorted by strand, strands in pieces through the vectorised solver; those that
+ * take long are gathered from all pieces for further attempts, and the stubborn ones finished one by one. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -11,7 +11,7 @@
 #include "curvature/sculpt_tail.h"
 #include "groom/curvature.h"
 
-#define STRANDS_A_PIECE 64
+#define STRANDS_A_PIECE 256
 #define MOST_ANCHORS 256
 
 struct groom_sculpt_options groom_sculpt_options_default(void)
@@ -61,10 +61,20 @@ static groom_status check_anchors(const struct groom_superhelices *h, const stru
 
 /* --- scratch of one thread ------------------------------------------------------------------ */
 
+/* The strands of one piece, as the solver takes them. */
+struct sculpt_batch {
+    uint32_t n;
+    struct lane_input in[STRANDS_A_PIECE];
+    struct lane_output out[STRANDS_A_PIECE];
+    double (*q[STRANDS_A_PIECE])[3];
+};
+
 struct sculpt_space {
     uint32_t max_elements, max_anchors;
     struct sculpt_group *group;
     struct located_anchor *located; /* [STRANDS_A_PIECE * max_anchors] */
+    struct sculpt_problem *problems;/* [STRANDS_A_PIECE] */
+    struct sculpt_batch *batch, *again; /* one each: the present piece, and another attempt at it */
     double (*detour)[3];            /* [STRANDS_A_PIECE * max_elements] */
     double *tail;                   /* [tail_space] */
     struct chain_state *junction;   /* [max_elements + 1] */
@@ -74,6 +84,9 @@ static void space_finish(struct sculpt_space *s, const struct groom_allocator *a
 {
     sculpt_group_destroy(s->group);
     memory_release(a, s->located, (size_t)STRANDS_A_PIECE * s->max_anchors, sizeof *s->located);
+    memory_release(a, s->problems, STRANDS_A_PIECE, sizeof *s->problems);
+    memory_release(a, s->batch, 1, sizeof *s->batch);
+    memory_release(a, s->again, 1, sizeof *s->again);
     memory_release(a, s->detour, (size_t)STRANDS_A_PIECE * s->max_elements, sizeof *s->detour);
     memory_release(a, s->tail, tail_space(s->max_elements), sizeof *s->tail);
     memory_release(a, s->junction, (size_t)s->max_elements + 1, sizeof *s->junction);
@@ -86,10 +99,13 @@ static int space_init(struct sculpt_space *s, uint32_t max_elements, uint32_t ma
     s->max_anchors = max_anchors;
     s->group = sculpt_group_create(max_elements, max_anchors, a);
     s->located = memory_array(a, (size_t)STRANDS_A_PIECE * max_anchors, sizeof *s->located);
+    s->problems = memory_array(a, STRANDS_A_PIECE, sizeof *s->problems);
+    s->batch = memory_array(a, 1, sizeof *s->batch);
+    s->again = memory_array(a, 1, sizeof *s->again);
     s->detour = memory_array(a, (size_t)STRANDS_A_PIECE * max_elements, sizeof *s->detour);
     s->tail = memory_array(a, tail_space(max_elements), sizeof *s->tail);
     s->junction = memory_array(a, (size_t)max_elements + 1, sizeof *s->junction);
-    return s->group && s->located && s->detour && s->tail && s->junction;
+    return s->group && s->located && s->problems && s->batch && s->again && s->detour && s->tail && s->junction;
 }
 
 /* --- anchors by strand --------------------------------------------------------------------- */
@@ -106,6 +122,9 @@ struct sculpt_job {
     uint32_t *order;        /* [n_anchors] */
     uint32_t *touched;      /* [n_touched] strands with anchors */
     uint32_t n_touched;
+    struct lane_output *out;/* [n_touched] */
+    uint32_t *hard;         /* [n_hard] of the touched: those that took long, together, so that lanes are full */
+    uint32_t n_hard;
     double (*result)[3];    /* [n_elements]: so that an error leaves the input as it was */
     struct sculpt_space *spaces;
     uint32_t n_spaces, most_elements, most_anchors;
@@ -221,122 +240,140 @@ static struct lane_input lane_of(const struct sculpt_job *job, uint32_t i, const
                                .c = p->c, .least_energy = 1e-24 * length * length};
 }
 
-/* The strands of one piece, as the solver takes them. */
-struct sculpt_batch {
-    uint32_t n;
-    struct lane_input in[STRANDS_A_PIECE];
-    struct lane_output out[STRANDS_A_PIECE];
-    double (*q[STRANDS_A_PIECE])[3];
-};
-
 /* Strands that took long have targets they can hardly reach, and many minima: they go on from where they are;
  * then come from the start again by smaller turns; then from the start with a stiffness so high that there is one
  * minimum, which is followed while the stiffness falls to what it should be. The best is kept. */
 enum road { ROAD_ON, ROAD_SMALL_TURNS, ROAD_FALLING_STIFFNESS, N_ROADS };
 
-#define LONG_SHARE 0.66         /* of the first iterations: more than that is long */
+#define LONG_SHARE 0.38         /* of the first iterations: more than that is long */
 #define SMALL_TURNS 0.27        /* of the usual cap */
 #define FIRST_STIFFNESS 1000.0  /* times what it should be */
 #define STIFFNESS_FALL 5.0
 #define FALL_STEPS 20           /* at each stiffness on the way */
+#define SHARE_OF_FIRST 0.9      /* of the progress: the rest is the hard strands' */
 
 /* `again` begins where the strand is at the last of the stiffnesses above its own. */
-static void follow_stiffness(struct sculpt_space *space, const struct sculpt_batch *first, struct sculpt_batch *again,
-                             const uint32_t *hard, const struct sculpt_settings *settings)
+static void follow_stiffness(struct sculpt_space *space, const struct sculpt_batch *hard, struct sculpt_batch *again,
+                             const struct sculpt_settings *settings)
 {
     struct sculpt_settings few = *settings;
     few.n_steps = FALL_STEPS;
     for (double factor = FIRST_STIFFNESS; factor > 1.0; factor /= STIFFNESS_FALL) {
         for (uint32_t i = 0; i < again->n; i++)
-            again->in[i].c = first->in[hard[i]].c * factor;
+            again->in[i].c = hard->in[i].c * factor;
         sculpt_group_solve(space->group, again->in, again->n, &few, again->q, again->out);
         for (uint32_t i = 0; i < again->n; i++)
             again->in[i].q = (const double (*)[3])again->q[i];
     }
     for (uint32_t i = 0; i < again->n; i++)
-        again->in[i].c = first->in[hard[i]].c;
+        again->in[i].c = hard->in[i].c;
 }
 
-static void take_road(const struct sculpt_job *job, struct sculpt_space *space, const struct sculpt_batch *first,
-                      struct lane_output *best, const uint32_t *hard, uint32_t n_hard, enum road road)
+static void take_road(const struct sculpt_job *job, struct sculpt_space *space, struct sculpt_batch *hard, enum road road)
 {
-    struct sculpt_batch again = {.n = n_hard};
+    struct sculpt_batch *again = space->again;
     struct sculpt_settings settings = {.n_steps = 10 * job->options->max_iterations, .tolerance = job->options->tolerance,
                                        .most_turning = job->options->most_turning};
     if (road == ROAD_SMALL_TURNS)
         settings.most_turning *= SMALL_TURNS;
-    for (uint32_t i = 0; i < n_hard; i++) {
-        again.in[i] = first->in[hard[i]];
-        again.q[i] = space->detour + (size_t)i * space->max_elements;
+    again->n = hard->n;
+    for (uint32_t i = 0; i < hard->n; i++) {
+        again->in[i] = hard->in[i];
+        again->q[i] = space->detour + (size_t)i * space->max_elements;
         if (road == ROAD_ON)
-            again.in[i].q = (const double (*)[3])first->q[hard[i]];
+            again->in[i].q = (const double (*)[3])hard->q[i];
     }
     if (road == ROAD_FALLING_STIFFNESS)
-        follow_stiffness(space, first, &again, hard, &settings);
-    sculpt_group_solve(space->group, again.in, n_hard, &settings, again.q, again.out);
-    for (uint32_t i = 0; i < n_hard; i++) {
-        struct lane_output *o = &best[hard[i]];
-        again.out[i].energy_before = o->energy_before;
-        again.out[i].iterations += o->iterations;
-        o->iterations = again.out[i].iterations;
-        if (!(again.out[i].energy < o->energy) && road != ROAD_ON)
+        follow_stiffness(space, hard, again, &settings);
+    sculpt_group_solve(space->group, again->in, again->n, &settings, again->q, again->out);
+    for (uint32_t i = 0; i < hard->n; i++) {
+        struct lane_output *best = &hard->out[i];
+        again->out[i].energy_before = best->energy_before;
+        again->out[i].iterations += best->iterations;
+        best->iterations = again->out[i].iterations;
+        if (!(again->out[i].energy < best->energy) && road != ROAD_ON)
             continue;
-        *o = again.out[i];
-        memcpy(first->q[hard[i]], again.q[i], first->in[hard[i]].n * sizeof *again.q[i]);
+        *best = again->out[i];
+        memcpy(hard->q[i], again->q[i], hard->in[i].n * sizeof *again->q[i]);
     }
 }
 
 /* Did it take long? Some arrive in a minimum that is not the best one to be had. */
 static int is_hard(const struct sculpt_job *job, const struct lane_output *o)
 {
+    if (job->options->n_roads == 0)
+        return 0;
     return o->active || o->iterations > job->options->max_iterations * LONG_SHARE;
 }
 
-static void take_roads(const struct sculpt_job *job, struct sculpt_space *space, struct sculpt_batch *batch)
+/* Strands begin, begin + 1, ... of `order`, or of the touched themselves where it is NULL, at most a piece of them. */
+static struct sculpt_batch *fill_batch(const struct sculpt_job *job, struct sculpt_space *space, const uint32_t *order,
+                                       uint32_t n, uint32_t begin)
 {
-    uint32_t hard[STRANDS_A_PIECE], n_hard = 0;
-    for (uint32_t k = 0; k < batch->n; k++)
-        if (is_hard(job, &batch->out[k]))
-            hard[n_hard++] = k;
-    for (uint32_t road = 0; road < job->options->n_roads && road < N_ROADS && n_hard > 0; road++)
-        take_road(job, space, batch, batch->out, hard, n_hard, (enum road)road);
+    struct sculpt_batch *batch = space->batch;
+    batch->n = n - begin < STRANDS_A_PIECE ? n - begin : STRANDS_A_PIECE;
+    for (uint32_t k = 0; k < batch->n; k++) {
+        uint32_t t = order ? order[begin + k] : begin + k, i = job->touched[t];
+        space->problems[k] = problem_of(job, i, space->located + (size_t)k * space->max_anchors);
+        batch->in[k] = lane_of(job, i, &space->problems[k]);
+        batch->out[k] = job->out[t];
+        batch->q[k] = job->result + job->helices->first[i];
+    }
+    return batch;
 }
 
 static void sculpt_piece(void *user, uint32_t piece, uint32_t thread)
 {
     struct sculpt_job *job = user;
     struct sculpt_space *space = &job->spaces[thread];
-    struct sculpt_problem problems[STRANDS_A_PIECE];
-    struct sculpt_batch batch = {0};
     struct sculpt_settings settings = {.n_steps = job->options->max_iterations, .tolerance = job->options->tolerance,
                                        .most_turning = job->options->most_turning};
     uint32_t begin = (job->begin_piece + piece) * STRANDS_A_PIECE;
-    batch.n = job->n_touched - begin < STRANDS_A_PIECE ? job->n_touched - begin : STRANDS_A_PIECE;
-    for (uint32_t k = 0; k < batch.n; k++) {
-        uint32_t i = job->touched[begin + k];
-        problems[k] = problem_of(job, i, space->located + (size_t)k * space->max_anchors);
-        batch.in[k] = lane_of(job, i, &problems[k]);
-        batch.q[k] = job->result + job->helices->first[i];
+    struct sculpt_batch *batch = fill_batch(job, space, NULL, job->n_touched, begin);
+    sculpt_group_solve(space->group, batch->in, batch->n, &settings, batch->q, batch->out);
+    for (uint32_t k = 0; k < batch->n; k++) {
+        job->out[begin + k] = batch->out[k];
+        if (!is_hard(job, &batch->out[k]))
+            finish_strand(job, space, job->touched[begin + k], &space->problems[k], &batch->out[k]);
     }
-    sculpt_group_solve(space->group, batch.in, batch.n, &settings, batch.q, batch.out);
-    take_roads(job, space, &batch);
-    for (uint32_t k = 0; k < batch.n; k++)
-        finish_strand(job, space, job->touched[begin + k], &problems[k], &batch.out[k]);
+}
+
+static void sculpt_hard_piece(void *user, uint32_t piece, uint32_t thread)
+{
+    struct sculpt_job *job = user;
+    struct sculpt_space *space = &job->spaces[thread];
+    uint32_t begin = (job->begin_piece + piece) * STRANDS_A_PIECE;
+    struct sculpt_batch *hard = fill_batch(job, space, job->hard, job->n_hard, begin);
+    for (uint32_t road = 0; road < job->options->n_roads && road < N_ROADS; road++)
+        take_road(job, space, hard, (enum road)road);
+    for (uint32_t k = 0; k < hard->n; k++)
+        finish_strand(job, space, job->touched[job->hard[begin + k]], &space->problems[k], &hard->out[k]);
 }
 
 /* In chunks, so that a large sculpt reports progress and can be stopped. */
-static groom_status run_chunks(struct sculpt_job *job, struct groom_diag *diag)
+static groom_status run_chunks(struct sculpt_job *job, uint32_t n, parallel_body *body, double from, double to,
+                               struct groom_diag *diag)
 {
     enum { PIECES_A_CHUNK = 32 };
-    uint32_t pieces = job->n_touched / STRANDS_A_PIECE + (job->n_touched % STRANDS_A_PIECE != 0);
+    uint32_t pieces = n / STRANDS_A_PIECE + (n % STRANDS_A_PIECE != 0);
     for (job->begin_piece = 0; job->begin_piece < pieces; job->begin_piece += PIECES_A_CHUNK) {
         uint32_t left = pieces - job->begin_piece, here = left < PIECES_A_CHUNK ? left : PIECES_A_CHUNK;
         if (progress_cancelled(job->context))
             return groom_fail(diag, GROOM_ECANCELLED, "the sculpt was cancelled");
-        parallel_for(job->context, here, sculpt_piece, job);
-        progress_report(job->context, (double)(job->begin_piece + here) / pieces);
+        parallel_for(job->context, here, body, job);
+        progress_report(job->context, from + (to - from) * (job->begin_piece + here) / pieces);
     }
     return GROOM_OK;
+}
+
+/* All strands, then the hard ones together: one or two of each piece would leave most lanes empty. */
+static groom_status run(struct sculpt_job *job, struct groom_diag *diag)
+{
+    groom_status st = run_chunks(job, job->n_touched, sculpt_piece, 0.0, SHARE_OF_FIRST, diag);
+    for (uint32_t t = 0; t < job->n_touched; t++)
+        if (is_hard(job, &job->out[t]))
+            job->hard[job->n_hard++] = t;
+    return st == GROOM_OK ? run_chunks(job, job->n_hard, sculpt_hard_piece, SHARE_OF_FIRST, 1.0, diag) : st;
 }
 
 static int job_init(struct sculpt_job *job)
@@ -346,10 +383,12 @@ static int job_init(struct sculpt_job *job)
     job->first = memory_array_zero(a, (size_t)h->n_strands + 1, sizeof *job->first);
     job->order = memory_array(a, job->n_anchors, sizeof *job->order);
     job->touched = memory_array(a, h->n_strands, sizeof *job->touched);
+    job->hard = memory_array(a, h->n_strands, sizeof *job->hard);
+    job->out = memory_array_zero(a, h->n_strands, sizeof *job->out);
     job->result = memory_array(a, h->n_elements, sizeof *job->result);
     job->n_spaces = parallel_threads(job->context);
     job->spaces = memory_array_zero(a, job->n_spaces, sizeof *job->spaces);
-    return job->first && job->order && job->touched && job->result && job->spaces;
+    return job->first && job->order && job->touched && job->hard && job->out && job->result && job->spaces;
 }
 
 static int spaces_init(struct sculpt_job *job)
@@ -369,6 +408,8 @@ static void job_finish(struct sculpt_job *job)
     memory_release(a, job->first, (size_t)h->n_strands + 1, sizeof *job->first);
     memory_release(a, job->order, job->n_anchors, sizeof *job->order);
     memory_release(a, job->touched, h->n_strands, sizeof *job->touched);
+    memory_release(a, job->hard, h->n_strands, sizeof *job->hard);
+    memory_release(a, job->out, h->n_strands, sizeof *job->out);
     memory_release(a, job->result, h->n_elements, sizeof *job->result);
     memory_release(a, job->spaces, job->n_spaces, sizeof *job->spaces);
 }
@@ -401,7 +442,7 @@ groom_status groom_superhelices_sculpt(struct groom_superhelices *helices, const
     memcpy(job.result, helices->q, helices->n_elements * sizeof *job.result);
     if (outcomes)
         memset(outcomes, 0, helices->n_strands * sizeof *outcomes);
-    if ((st = run_chunks(&job, diag)) == GROOM_OK)
+    if ((st = run(&job, diag)) == GROOM_OK)
         memcpy(helices->q, job.result, helices->n_elements * sizeof *job.result);
     goto out;
 no_memory:

@@ -11,21 +11,17 @@
 
 #include "curvature/element.h"
 
-/* Steps that the quasi-Newton recursion looks back on. */
-#define SCULPT_MEMORY 3
-
 struct symmetric {
     real xx, xy, xz, yy, yz, zz;
 };
 
-/* What is known before an element, from the root on; and the element's own A and U. Reals only. */
+/* What is known before an element, from the root on. Reals only. */
 struct sculpt_passing {
     vec3 p;
     mat3 F;
     vec3 q;
-    mat3 A, U;
-    struct symmetric UU, AA;
-    mat3 AU;
+    real ll, llpp;        /* sums over the elements before: l^2, l^2 |p|^2 */
+    vec3 llp;             /* ... and l^2 p */
 };
 
 struct sculpt_anchor {
@@ -49,20 +45,17 @@ struct sculpt_group {
     real c, least_energy; /* of each strand */
     real n_coordinates;   /* of each strand's own anchors: 3 each */
     real *length;         /* [n] */
-    vec3 *q, *rest, *step, *trial, *down, *moved; /* [n] */
+    vec3 *q, *rest, *step, *trial, *own_step; /* [n] */
     mat3 *A, *U;          /* [n] */
+    mat3 *gain_v, *gain_w;/* [n] how an element answers to what the elements before it move */
     struct sculpt_anchor *anchor; /* [m] */
     struct sculpt_event *event;   /* [4 m] */
     uint32_t n_events;
-    real *normal, *factor;/* [3m][3m] */
-    real *w;              /* [3m] */
-    vec3 *moves, *changes;/* [SCULPT_MEMORY][n] the last steps, and the changes of b over them */
-    real rho[SCULPT_MEMORY]; /* 1 / (step . change); 0: nothing to look back on */
-    uint32_t newest;
     /* how each lane stands */
     lane_mask active;     /* holds a strand that is not done */
     lane_mask fresh;      /* whose energy is not known yet */
     lane_mask converged;
+    lane_mask curved;     /* takes second derivatives of the anchors into its next step */
     real energy, energy_before, iterations, mu, grow;
     /* the queue */
     const struct lane_input *in;

@@ -6,9 +6,8 @@
 
 /* X(member, count), n elements and m anchors at most */
 #define GROUP_ARRAYS(X)                                                                            \
-    X(length, n) X(q, n) X(rest, n) X(step, n) X(trial, n) X(down, n) X(moved, n)                  \
-    X(moves, SCULPT_MEMORY * n) X(changes, SCULPT_MEMORY * n) X(A, n) X(U, n) X(anchor, m)         \
-    X(event, LANES * m) X(normal, 9 * m * m) X(factor, 9 * m * m) X(w, 3 * m)
+    X(length, n) X(q, n) X(rest, n) X(step, n) X(trial, n) X(own_step, n) X(A, n) X(U, n)          \
+    X(gain_v, n) X(gain_w, n) X(anchor, m) X(event, LANES * m)
 
 void sculpt_group_destroy(struct sculpt_group *g)
 {
@@ -85,12 +84,7 @@ static void reset_lane(struct sculpt_group *g, uint32_t lane, int used)
     g->energy[lane] = g->energy_before[lane] = g->iterations[lane] = 0.0;
     g->mu[lane] = -1.0;
     g->grow[lane] = 3.0;
-    for (uint32_t i = 0; i < SCULPT_MEMORY; i++)
-        g->rho[i][lane] = 0.0;
-    for (uint32_t j = 0; j < g->n; j++)
-        put(&g->moved[j], lane, 0.0, 0.0, 0.0), put(&g->down[j], lane, 0.0, 0.0, 0.0);
-    for (size_t j = 0; j < (size_t)SCULPT_MEMORY * g->n; j++) /* times rho 0: they must be finite */
-        put(&g->moves[j], lane, 0.0, 0.0, 0.0), put(&g->changes[j], lane, 0.0, 0.0, 0.0);
+    g->curved[lane] = 0;
 }
 
 /* Anchors of all lanes by element; insertion, for they come nearly sorted. */
@@ -172,7 +166,7 @@ void sculpt_group_solve(struct sculpt_group *g, const struct lane_input *in, uin
     }
     g->in = in, g->out = out, g->result = q;
     g->n_in = n_in;
-    g->next = g->newest = 0;
+    g->next = 0;
     for (uint32_t lane = 0; lane < LANES; lane++) {
         g->strand[lane] = UINT32_MAX;
         load_lane(g, lane, &idle);

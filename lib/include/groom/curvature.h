@@ -149,7 +149,7 @@ struct groom_anchor {
 struct groom_sculpt_options {
     double stiffness;        /* N c of Eq. 15 (metre^4, N the strand's elements): how little curvature may change */
     uint32_t max_iterations; /* of the first attempt */
-    uint32_t n_roads;        /* for strands that took two thirds of them or more: 0 leave them; 1 go on, up to ten
+    uint32_t n_roads;        /* for strands that took more than a third of them: 0 leave them; 1 go on, up to ten
                                 times as many; 2 come again from the start by smaller turns; 3 and again by falling
                                 stiffness; the best is kept */
     uint32_t max_tail;       /* of a plain L-BFGS, for what still goes downhill after all that */
