@@ -121,14 +121,12 @@ static groom_status refuse_no_lines(struct obj *obj)
 {
     if (obj->reader->out->points.n == 0 && obj->n_faces == 0)
         return groom_fail_at(obj->reader->diag, GROOM_EFORMAT, 0,
-                             "this is text without a vertex (\"v\") or a line (\"l\") of OBJ in it: no file of strands");
+                             "this is no strand file: text without a vertex (\"v\") or a line (\"l\") of OBJ in it");
     return groom_fail_at(obj->reader->diag, GROOM_EFORMAT, (int64_t)text_offset(&obj->text),
                          "%llu vertices and %llu faces but no line (\"l\") by byte %llu: %s",
                          (unsigned long long)obj->reader->out->points.n, (unsigned long long)obj->n_faces,
                          (unsigned long long)text_offset(&obj->text),
-                         obj->n_faces              ? "this is a mesh; upload it as a head"
-                         : obj->reader->out->points.n ? "strands were expected"
-                                                      : "this is no strand file");
+                         obj->n_faces ? "this is a mesh; upload it as a head" : "strands were expected");
 }
 
 groom_status read_obj(struct reader *reader)
