@@ -3,7 +3,7 @@
 import test from 'node:test';
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { readFileSync, readdirSync, writeFileSync } from 'node:fs';
+import { existsSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { build, temporaryFolder } from '../support/daemon.mjs';
 import { call, expect, groom_document, hair, head_obj, startIdleDaemon } from '../support/api.mjs';
@@ -53,6 +53,24 @@ test('uploads, a fit, its cancellation, removal', async (t) => {
   const spare = (await expect(daemon, 201, 'POST', '/v1/strands?unit=mm', { body: files['a hair.hair'] })).json.id;
   const { code, output } = await bash(commandsOf({ method: 'DELETE', path: `/v1/strands/${spare}` }, { origin: daemon.url }).groomctl);
   assert.equal(code, 0, output);
+});
+
+test('a retargeting, with a hairline in a file', async (t) => {
+  const daemon = await startIdleDaemon(t), post = async (path, body) => (await expect(daemon, 201, 'POST', path, { body })).json.id;
+  const strands = await post('/v1/strands', hair(30, 8)), [head, other] = [await post('/v1/heads?name=a', head_obj()), await post('/v1/heads?name=b&unit=cm', head_obj())];
+  const groom = (await expect(daemon, 201, 'POST', '/v1/grooms', { body: groom_document() })).json.groom;
+  const hairline = { kind: 'balding', points: [[0.1, 1.6, 0], [0, 1.65, 0.1], [-0.1, 1.6, 0]] }, options = { guides: 20, mode: 'global', sigma_root: 0.25 };
+  for (const [subject, target] of [[{ strands }, { head: other, hairline }], [{ groom, dense: true, revision: 1 }, { head: other }], [{ groom }, { head: other }]]) {
+    const made = [], body = { kind: 'retarget', ...subject, source: { head }, target, options };
+    const folders = await both(t, daemon, { method: 'POST', path: '/v1/jobs', body }, {}, async () => {
+      const { id } = (await daemon.json('/v1/jobs')).jobs[0], { kind, strands: of, groom: of_groom, dense, revision, source, targets, options: taken } = await daemon.json(`/v1/jobs/${id}`);
+      made.push({ kind, of, of_groom, dense, revision, source, targets, taken });
+    });
+    assert.deepEqual(made[0], made[1]);
+    assert.deepEqual([made[0].kind, made[0].source, made[0].taken.sigma_root, made[0].taken.guides], ['retarget', { head }, 0.25, 20]);
+    assert.deepEqual(made[0].targets, [target]);
+    assert.equal(existsSync(join(folders.groomctl, 'hairline.json')), Boolean(target.hairline));
+  }
 });
 
 test('edits: each line makes the revision that the page made', async (t) => {

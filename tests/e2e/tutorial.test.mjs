@@ -26,7 +26,7 @@ test('the tutorial, line by line', { timeout: 400000 * slowness }, async (t) => 
   for (const stream of [child.stdout, child.stderr]) stream.on('data', (bytes) => { output += bytes; });
   const code = await new Promise((done) => child.on('close', done));
   assert.equal(code, 0, output);
-  for (const name of ['groom.usda', 'guides.obj', 'curl.png', 'ruffle.png', 'turn.png', 'groom.json']) assert.ok(statSync(join(folder, name)).size > 1000, name);
+  for (const name of ['groom.usda', 'guides.obj', 'curl.png', 'ruffle.png', 'turn.png', 'groom.json', 'wide.usda']) assert.ok(statSync(join(folder, name)).size > 1000, name);
   assert.equal(readHair(join(folder, 'tenth.hair')).n_strands, 400);
   assert.notDeepEqual(readFileSync(join(folder, 'curl.png')), readFileSync(join(folder, 'ruffle.png')));
   const groom = JSON.parse(readFileSync(join(folder, 'groom.json'), 'utf8'));

@@ -1,6 +1,7 @@
 /* What strands are coloured by: numbers of each vertex, from the daemon's analysis or against the target, each
  * with a palette, a range and words for the legend. */
 import { bytes } from './api.mjs';
+import { arrayOf } from './strands.mjs';
 
 const SAMPLE = 4096; /* values that a range is found from */
 
@@ -15,6 +16,10 @@ export const COLOURS = {
     radius: { label: 'curl radius', column: 0, palette: RISING, unit: 'mm', scale: 1000, logarithmic: true },
     hand: { label: 'handedness', column: 2, palette: SIDES, range: [-1, 1], words: ['left', 'straight', 'right'] },
     beta: { label: 'beta', column: 3, palette: SIDES, range: [-1, 1], words: ['−1: left helix', '0: wave', '1: right helix'] },
+    movement: { label: 'moved onto this head', carried: 'movement', palette: HEAT, unit: 'mm', scale: 1000 },
+    depth: { label: 'was inside this head', carried: 'depth', palette: HEAT, unit: 'mm', scale: 1000 },
+    stretch: { label: 'change of length', carried: 'stretch', less: 1, palette: SIDES, about: 0, unit: '%', scale: 100 },
+    density: { label: 'change of root density', carried: 'density', palette: SIDES, about: 0, unit: '%', scale: 100 },
     distance: { label: 'distance to the target', palette: HEAT, unit: 'mm', scale: 1000, target: true },
 };
 
@@ -50,6 +55,22 @@ async function analysed({ column, logarithmic }, session, slotOf) {
     return values;
 }
 
+/* Those that this groom has something for. */
+export const coloursOf = ({ retarget }) => Object.entries(COLOURS).filter(([, { carried }]) => !carried || retarget?.strands?.[carried]);
+
+/* Numbers of whole strands, of the retargeting that brought them here. */
+function ofStrands({ carried, less = 0 }, { order, document: { retarget, strands: { vertices } } }) {
+    const table = arrayOf(retarget.strands[carried]), values = new Float32Array(order.length * vertices);
+    order.forEach((strand, slot) => values.fill(table[strand] - less, slot * vertices, (slot + 1) * vertices));
+    return values;
+}
+
+/* As far to both sides. */
+function rangeAbout(values, middle) {
+    const [low, high] = rangeOf(values), most = Math.max(middle - low, high - middle, 1e-6);
+    return [middle - most, middle + most];
+}
+
 /* How far each vertex is from that of the target's same strand, at the same share of its length. */
 export function distances(strands, target) {
     const n = strands.count * strands.vertices, values = new Float32Array(n), a = strands.points, b = target.points;
@@ -59,8 +80,8 @@ export function distances(strands, target) {
 
 /* { values, range, palette, labels } of the strands that are shown. */
 export async function colourBy(name, { session, strands, target, slotOf }) {
-    const colour = COLOURS[name], values = colour.target ? distances(strands, target) : await analysed(colour, session, slotOf);
-    const range = colour.range ?? rangeOf(values, colour.target), number = (v) => ((colour.logarithmic ? Math.exp(v) : v) * colour.scale).toPrecision(2);
+    const colour = COLOURS[name], values = colour.target ? distances(strands, target) : colour.carried ? ofStrands(colour, session) : await analysed(colour, session, slotOf);
+    const range = colour.range ?? (colour.about === undefined ? rangeOf(values, colour.target || colour.carried) : rangeAbout(values, colour.about)), number = (v) => ((colour.logarithmic ? Math.exp(v) : v) * colour.scale).toPrecision(2);
     const labels = colour.words ?? [number(range[0]), number((range[0] + range[1]) / 2), `${number(range[1])} ${colour.unit}`];
     return { values, range, palette: paletteOf(colour.palette), anchors: colour.palette, labels };
 }

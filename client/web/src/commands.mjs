@@ -33,6 +33,16 @@ function fit({ body }) {
     return ['fit', body.strands, flag('head', body.head), known, flag('operators', Array.isArray(operators) ? operators.join(',') : operators), flag('priority', body.priority), flat(others)];
 }
 
+/* A target's hairline stands in a file. */
+function retarget({ body }) {
+    const { guides, iterations, mode, seed, ...others } = body.options ?? {}, { head, hairline } = body.target;
+    const line = words('retarget', body.strands ?? body.groom, head, flag('source', body.source?.head), body.dense ? '--dense' : '', flag('revision', body.revision),
+        Object.entries({ guides, iterations, mode, seed }).map(([name, value]) => flag(name, value)).flat(), flat(others), hairline ? ['--hairline', 'hairline.json'] : []);
+    return { line: `${hairline ? `printf %s ${quoted(JSON.stringify(hairline))} > hairline.json && ` : ''}groomctl ${line}` };
+}
+
+const job = (call) => (call.body.kind === 'retarget' ? retarget(call) : fit(call));
+
 /* "set" adds and removes; what else a patch does goes through "patch". */
 function patch({ id, body }) {
     const simple = Array.isArray(body) && body.every(({ op, value }) => (op === 'add' && text_of(value) !== '') || op === 'remove');
@@ -67,7 +77,7 @@ const exported = (more) => ({ id, query, file }) => ['export', id, more, asked(q
 const COMMANDS = [
     ['POST', /^\/v1\/strands$/, upload('upload')],
     ['POST', /^\/v1\/heads$/, upload('upload-head')],
-    ['POST', /^\/v1\/jobs$/, fit],
+    ['POST', /^\/v1\/jobs$/, job],
     ['DELETE', /^\/v1\/jobs\/(\w+)$/, ({ id }) => ['cancel', id]],
     ['DELETE', /^\/v1\/(?:strands|heads|grooms)\/(\w+)$/, ({ id }) => ['delete', id]],
     ['POST', /^\/v1\/grooms$/, ({ file }) => ['import', file ?? 'groom.json']],
@@ -132,7 +142,8 @@ function whole(path) {
 const TITLES = [[/\/(ruffle|sculpt|interpolate|curl-scale|revert)$/, (m) => m[1].replace('-', ' ')], [/\/guides$/, () => 'guides'], [/preview\.png$/, () => 'picture'],
     [/turntable\.png$/, () => 'turntable'], [/\/(strands|data)$/, () => 'strands'], [/\/jobs$/, () => 'fit'], [/\/jobs\//, () => 'cancel'], [/^\/v1\/grooms$/, () => 'import']];
 
-function titleOf({ method, at }) {
+function titleOf({ method, at, body }) {
+    if (body?.kind === 'retarget') return 'another head';
     if (method === 'DELETE' && !at.startsWith('/v1/jobs')) return 'remove';
     if (method === 'POST' && /^\/v1\/(strands|heads)$/.test(at)) return 'upload';
     if (method === 'PATCH') return 'edit';

@@ -8,6 +8,7 @@ import { exportPanel } from './panels/export.mjs';
 import { picturePanel } from './panels/picture.mjs';
 import { historyPanel } from './panels/history.mjs';
 import { operatorsPanel } from './panels/operators.mjs';
+import { retargetPanel } from './panels/retarget.mjs';
 import { sculptPanel } from './panels/sculpt.mjs';
 import { viewPanel } from './panels/view.mjs';
 import { Hair, boxOf } from './viewer/hair.mjs';
@@ -87,6 +88,7 @@ export async function groomPage(main, id, strands = AT_FIRST) {
     operatorsPanel(chain, session, types);
     const armature = sculptPanel(work, session, viewer);
     historyPanel(work, session);
+    retargetPanel(work, session);
     exportPanel(work, session);
     picturePanel(work, session, viewer);
     await evaluation.request();

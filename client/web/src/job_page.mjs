@@ -40,7 +40,7 @@ export async function jobPage(main, id) {
     const bar = element('progress', { max: 1, value: job.progress, 'aria-label': 'Progress' }), words = element('p', { role: 'status' });
     const open = element('a', { class: 'button', hidden: true }, 'Open the groom');
     const cancel = action('Cancel', () => call('DELETE', `/v1/jobs/${id}`)), plots = element('div', { class: 'plots' });
-    main.replaceChildren(element('div', { class: 'job panel' }, element('h2', {}, `${job.kind} of ${job.strands}`), bar, words, element('div', { class: 'row' }, cancel, open), plots));
+    main.replaceChildren(element('div', { class: 'job panel' }, element('h2', {}, `${job.kind} of ${job.strands ?? job.groom}`), bar, words, element('div', { class: 'row' }, cancel, open), plots));
     by_id('trail').replaceChildren(element('a', { href: `#/jobs/${id}` }, id));
     say('');
     const curves = new Curves(plots);
@@ -52,7 +52,10 @@ export async function jobPage(main, id) {
         words.textContent = last.error ? `${last.state}: ${last.error.detail ?? last.error.title}` : last.state;
         bar.value = last.state === 'succeeded' ? 1 : last.progress;
         if (last.result?.groom) Object.assign(open, { href: `#/grooms/${last.result.groom}`, hidden: false });
+        return last;
     };
+    /* A retargeting takes moments: who waits for it wants to see it. */
+    const leave = ({ kind, result }) => { if (kind === 'retarget' && result?.groom && location.hash === `#/jobs/${id}`) location.hash = open.hash; };
     if (['succeeded', 'failed', 'cancelled'].includes(job.state)) { await end(); return () => {}; }
     words.textContent = job.state;
     return follow(id, (name, data) => {
@@ -62,6 +65,6 @@ export async function jobPage(main, id) {
         } else if (name === 'loss') {
             data.losses.forEach((row) => curves.add(row.stage ?? data.stage, row));
             curves.draw();
-        } else if (name === 'state' && ['succeeded', 'failed', 'cancelled'].includes(data.state)) end().catch(notice);
+        } else if (name === 'state' && ['succeeded', 'failed', 'cancelled'].includes(data.state)) end().then(leave).catch(notice);
     });
 }

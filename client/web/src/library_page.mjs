@@ -104,7 +104,8 @@ function strandsList(strands, heads) {
     return element('section', { class: 'panel' }, element('h2', {}, 'Strands'),
         strands.length ? [element('div', { class: 'row' }, 'Fit with', head, quality), cameras.row] : element('p', {}, 'None yet.'),
         element('ul', { class: 'rows' }, strands.map((s) => element('li', {}, element('span', {}, element('b', {}, s.name || s.id),
-            ` ${whole(s.strands)} strands, ${ago(s.created_at)}`), action('fit', () => fit(s.id), { 'aria-label': `fit ${s.name || s.id}` })))));
+            ` ${whole(s.strands)} strands, ${ago(s.created_at)}`), element('span', { class: 'row' }, element('a', { class: 'button', href: `#/retarget/${s.id}`, 'aria-label': `carry ${s.name || s.id} to another head` }, 'to another head'),
+                action('fit', () => fit(s.id), { 'aria-label': `fit ${s.name || s.id}` }))))));
 }
 
 const jobsList = (jobs) => element('section', { class: 'panel' }, element('h2', {}, 'Jobs'),

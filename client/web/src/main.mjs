@@ -9,8 +9,9 @@ import { groomPage } from './groom_page.mjs';
 import { jobPage } from './job_page.mjs';
 import { libraryPage } from './library_page.mjs';
 import { commandsPanel } from './panels/commands.mjs';
+import { retargetPage } from './retarget_page.mjs';
 
-const PAGES = [[/^#\/grooms\/(grm_\w+)(?:\?strands=(\d+))?$/, groomPage], [/^#\/jobs\/(job_\w+)$/, jobPage], [/^/, libraryPage]];
+const PAGES = [[/^#\/grooms\/(grm_\w+)(?:\?strands=(\d+))?$/, groomPage], [/^#\/jobs\/(job_\w+)$/, jobPage], [/^#\/retarget\/((?:grm|str)_\w+)$/, retargetPage], [/^/, libraryPage]];
 let leave = () => {}, turn = 0;
 
 async function show() {

@@ -1,6 +1,6 @@
 /* What the picture shows: where from, beside what, how densely, coloured by what. */
 import { get } from '../api.mjs';
-import { COLOURS, colourBy } from '../colours.mjs';
+import { COLOURS, colourBy, coloursOf } from '../colours.mjs';
 import { element, notice } from '../dom.mjs';
 import { arrayOf, fetchStrands } from '../strands.mjs';
 import { COMPARISONS, VIEWS } from '../viewer/viewer.mjs';
@@ -47,7 +47,7 @@ function showLegend(box, colours) {
 function colourControl(session, viewer, evaluation, against) {
     const box = legend();
     const select = element('select', { onchange: () => paint().catch(notice) },
-        Object.entries(COLOURS).map(([value, { label }]) => element('option', { value }, label)));
+        coloursOf(session.document).map(([value, { label }]) => element('option', { value }, label)));
     const paint = async () => {
         const name = select.value;
         if (name === 'none') { viewer.groom.colour(null); showLegend(box, null); viewer.draw(); return; }
