@@ -5,6 +5,7 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { slowness, startDaemon } from '../support/daemon.mjs';
 import { picture, startBrowser } from '../support/browser.mjs';
+import { decode } from '../support/api.mjs';
 import { drawn, sample, settled, skip } from '../support/studio.mjs';
 
 const axe = readFileSync(new URL('../node_modules/axe-core/axe.min.js', import.meta.url), 'utf8');
@@ -58,6 +59,8 @@ test('strands go to another head, and say what became of them', { skip, timeout:
     for (const [i, total] of [energy.before.total, energy.after.total].entries()) assert.ok(Math.abs(read(cells.energy[i]) / total - 1) < 0.01, cells.energy[i]);
     assert.match(cells['length over the source’s'][0], /^\d\.\d{3} to \d\.\d{3}$/);
   });
+  await page.locator('.report').scrollIntoViewIfNeeded();
+  await picture(page, 'studio-retarget-report');
   await t.test('strands are coloured by each of its numbers', async () => {
     const colour = page.getByLabel('colour by'), names = await colour.locator('option').evaluateAll((list) => list.map((o) => o.value));
     assert.deepEqual(names.filter((name) => ['movement', 'depth', 'stretch', 'density'].includes(name)), ['movement', 'depth', 'stretch'], 'no hairline was moved');
@@ -66,6 +69,11 @@ test('strands go to another head, and say what became of them', { skip, timeout:
       await page.locator('.legend').getByText(name === 'stretch' ? '%' : 'mm').waitFor();
       await page.waitForTimeout(300);
       await picture(page, `studio-retarget-${name}`);
+      const table = decode(document.retarget.strands[name]), seen = await page.evaluate(() => {
+        const { viewer: { groom: { values } }, session: { order, document: { strands: { vertices } } } } = window.studio;
+        return Array.from(order, (strand, slot) => [strand, values[slot * vertices], values[(slot + 1) * vertices - 1]]);
+      });
+      for (const [strand, ...ends] of seen) for (const value of ends) assert.ok(Math.abs(value - (table[strand] - (name === 'stretch'))) < 1e-6, `${name} of ${strand}`);
     }
     assert.deepEqual(await violations(page), []);
   });
@@ -141,6 +149,20 @@ test('a hairline is dragged on the head, moved by arrows, and carried', { skip, 
     assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), 'nothing sticks out to the right');
     await picture(page, 'studio-hairline-narrow');
     await page.setViewportSize({ width: 1100, height: 760 });
+  });
+  await t.test('a line that crosses itself is refused in words, and there to be mended', async () => {
+    await page.evaluate(() => {
+      const { editor } = window.studio, [a, b] = [3, 7].map((i) => editor.handles[i].clone());
+      editor.move(3, b);
+      editor.move(7, a);
+    });
+    const crossed = await handles();
+    await page.getByRole('button', { name: 'Carry it over' }).click();
+    await page.getByText(/^failed: .*cross/).waitFor();
+    await picture(page, 'studio-hairline-refused');
+    await page.getByRole('link', { name: 'Back to heads and hairline' }).click();
+    await page.waitForFunction(() => window.studio?.editor.moved);
+    assert.deepEqual(await handles(), crossed);
   });
   await t.test('roots follow it', async () => {
     await page.getByRole('button', { name: 'widow’s peak' }).click();

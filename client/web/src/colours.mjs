@@ -17,7 +17,7 @@ export const COLOURS = {
     hand: { label: 'handedness', column: 2, palette: SIDES, range: [-1, 1], words: ['left', 'straight', 'right'] },
     beta: { label: 'beta', column: 3, palette: SIDES, range: [-1, 1], words: ['−1: left helix', '0: wave', '1: right helix'] },
     movement: { label: 'moved onto this head', carried: 'movement', palette: HEAT, unit: 'mm', scale: 1000 },
-    depth: { label: 'was inside this head', carried: 'depth', palette: HEAT, unit: 'mm', scale: 1000 },
+    depth: { label: 'was inside this head', carried: 'depth', whole: true, palette: HEAT, unit: 'mm', scale: 1000 },
     stretch: { label: 'change of length', carried: 'stretch', less: 1, palette: SIDES, about: 0, unit: '%', scale: 100 },
     density: { label: 'change of root density', carried: 'density', palette: SIDES, about: 0, unit: '%', scale: 100 },
     distance: { label: 'distance to the target', palette: HEAT, unit: 'mm', scale: 1000, target: true },
@@ -65,6 +65,9 @@ function ofStrands({ carried, less = 0 }, { order, document: { retarget, strands
     return values;
 }
 
+/* Of what few strands have, and these count. */
+const rangeToMost = (values) => [0, Math.max(1e-5, values.reduce((most, value) => Math.max(most, value), 0))];
+
 /* As far to both sides. */
 function rangeAbout(values, middle) {
     const [low, high] = rangeOf(values), most = Math.max(middle - low, high - middle, 1e-6);
@@ -81,7 +84,7 @@ export function distances(strands, target) {
 /* { values, range, palette, labels } of the strands that are shown. */
 export async function colourBy(name, { session, strands, target, slotOf }) {
     const colour = COLOURS[name], values = colour.target ? distances(strands, target) : colour.carried ? ofStrands(colour, session) : await analysed(colour, session, slotOf);
-    const range = colour.range ?? (colour.about === undefined ? rangeOf(values, colour.target || colour.carried) : rangeAbout(values, colour.about)), number = (v) => ((colour.logarithmic ? Math.exp(v) : v) * colour.scale).toPrecision(2);
+    const range = colour.range ?? (colour.whole ? rangeToMost(values) : colour.about === undefined ? rangeOf(values, colour.target || colour.carried) : rangeAbout(values, colour.about)), number = (v) => ((colour.logarithmic ? Math.exp(v) : v) * colour.scale).toPrecision(2);
     const labels = colour.words ?? [number(range[0]), number((range[0] + range[1]) / 2), `${number(range[1])} ${colour.unit}`];
     return { values, range, palette: paletteOf(colour.palette), anchors: colour.palette, labels };
 }

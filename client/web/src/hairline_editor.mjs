@@ -44,6 +44,12 @@ export class HairlineEditor extends EventTarget {
         return box;
     }
 
+    /* As it was left, on the same head and line: what `handles` and `moved` were. */
+    restore({ handles, moved }) {
+        Object.assign(this, { handles, moved });
+        this.#show();
+    }
+
     close() {
         Object.assign(this, { handles: [], chosen: -1 });
         this.group.visible = false;
@@ -122,7 +128,7 @@ export class HairlineEditor extends EventTarget {
     move(handle, to) {
         const p = this.surface.closest(to);
         if (!p) return;
-        this.handles[handle] = p;
+        this.handles = this.handles.with(handle, p);
         this.moved = true;
         this.#show();
     }

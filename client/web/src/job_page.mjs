@@ -39,8 +39,9 @@ export async function jobPage(main, id) {
     const job = await get(`/v1/jobs/${id}`);
     const bar = element('progress', { max: 1, value: job.progress, 'aria-label': 'Progress' }), words = element('p', { role: 'status' });
     const open = element('a', { class: 'button', hidden: true }, 'Open the groom');
+    const again = element('a', { class: 'button', hidden: true, href: `#/retarget/${job.groom ?? job.strands}` }, 'Back to heads and hairline');
     const cancel = action('Cancel', () => call('DELETE', `/v1/jobs/${id}`)), plots = element('div', { class: 'plots' });
-    main.replaceChildren(element('div', { class: 'job panel' }, element('h2', {}, `${job.kind} of ${job.strands ?? job.groom}`), bar, words, element('div', { class: 'row' }, cancel, open), plots));
+    main.replaceChildren(element('div', { class: 'job panel' }, element('h2', {}, `${job.kind} of ${job.strands ?? job.groom}`), bar, words, element('div', { class: 'row' }, cancel, open, again), plots));
     by_id('trail').replaceChildren(element('a', { href: `#/jobs/${id}` }, id));
     say('');
     const curves = new Curves(plots);
@@ -49,6 +50,7 @@ export async function jobPage(main, id) {
     const end = async () => {
         const last = await get(`/v1/jobs/${id}`);
         cancel.hidden = true;
+        again.hidden = last.kind !== 'retarget' || last.state === 'succeeded';
         words.textContent = last.error ? `${last.state}: ${last.error.detail ?? last.error.title}` : last.state;
         bar.value = last.state === 'succeeded' ? 1 : last.progress;
         if (last.result?.groom) Object.assign(open, { href: `#/grooms/${last.result.groom}`, hidden: false });

@@ -9,6 +9,8 @@ import { Viewer } from './viewer/viewer.mjs';
 
 const KINDS = { front: 'move roots along', balding: 'give up the hair before it' };
 const MARGIN_M = 0.07;
+/* What was asked for last, by subject: a hairline that is refused is there to be mended. */
+const kept = new Map();
 const rounded = (p) => p.toArray().map((x) => Number(x.toFixed(6)));
 
 /* { subject, name, own, chained } of a groom or an upload. */
@@ -80,6 +82,7 @@ export async function retargetPage(main, id) {
         if (!form.valid()) return;
         const line = editor.handles.length && editor.moved ? { kind: hairline.kind.value, points: editor.points.map(rounded) } : null;
         const { json } = await call('POST', '/v1/jobs', { body: form.body(line) });
+        kept.set(id, { source: form.source.value, target: form.target.value, line: line && { handles: editor.handles, moved: true, kind: line.kind } });
         location.hash = `#/jobs/${json.id}`;
     });
     const changed = async () => {
@@ -89,7 +92,17 @@ export async function retargetPage(main, id) {
         if (form.target.value) await target.show(form.target.value);
     };
     work.append(...form.parts.filter(Boolean), hairline.panel, element('div', { class: 'row' }, start));
+    const last = kept.get(id);
+    if (last) {
+        form.source.value = last.source;
+        form.target.value = last.target;
+    }
     await changed();
+    if (last?.line && form.target.value === last.target) {
+        await target.hairline(form.given(), last.target);
+        editor.restore(last.line);
+        hairline.kind.value = last.line.kind;
+    }
     say('');
     window.studio = { viewer, editor }; /* for those who look inside, tests among them */
     return () => viewer.dispose();
