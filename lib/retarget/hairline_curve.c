@@ -158,10 +158,11 @@ groom_status curve_init(struct curve *curve, const struct groom_scalp_region *re
         return groom_fail_field(diag, GROOM_EINVAL, field, "the hairline has no length");
     if (!line_crosses_itself(curve->u, curve->n, 0, &first, &second))
         return GROOM_OK;
-    uint32_t at = drawn_before(curve, drawn, first);
+    uint32_t at = drawn_before(curve, drawn, first), again = drawn_before(curve, drawn, second);
     snprintf(field, sizeof field, "%s/points/%u", pointer, at);
-    return groom_fail_field(diag, GROOM_EINVAL, field, "the hairline crosses itself between points %u and %u", at,
-                            drawn_before(curve, drawn, second));
+    if (at == again) /* a loop of the smooth curve, where points come back on themselves */
+        return groom_fail_field(diag, GROOM_EINVAL, field, "the hairline crosses itself just behind point %u", at);
+    return groom_fail_field(diag, GROOM_EINVAL, field, "the hairline crosses itself between points %u and %u", at, again);
 }
 
 void curve_finish(struct curve *curve)
