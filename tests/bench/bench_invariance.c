@@ -4,41 +4,20 @@
  *     bench_invariance [n_strands [style|all [auto]]] */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "fit/state.h"
 #include "groom/mesh.h"
 #include "groom/strands.h"
-#include "tests/support/guides.h"
-
-enum { MOST = 64 };
-
-static void require(groom_status status, const struct groom_diag *diag)
-{
-    if (status == GROOM_OK)
-        return;
-    fprintf(stderr, "bench_invariance: %s: %s\n", groom_status_name(status), diag->detail);
-    exit(1);
-}
+#include "tests/support/known.h"
 
 static struct groom *fitted(const struct groom_sample *sample, uint64_t seed, int automatic, const struct groom_context *context)
 {
-    struct groom_fit_options options;
+    struct groom_fit_options options = known_options(sample, automatic);
     struct groom_diag diag = {0};
     struct groom *groom;
-    groom_fit_options_init(GROOM_FIT_STANDARD, &options);
-    if (!automatic) {
-        options.guides = sample->truth->n_guides;
-        options.operator_guides = sample->truth->n_operator_guides;
-    }
     options.seed = seed;
-    options.operators_auto = 0;
-    options.n_operators = sample->truth->n_operators;
-    for (uint32_t o = 0; o < options.n_operators; o++)
-        options.operators[o] = sample->truth->operators[o].type;
     struct groom_fit *fit = guides_fit(sample, &options, "", context);
-    require(groom_fit_result(fit, context, &groom, &diag), &diag);
+    known_must(groom_fit_result(fit, context, &groom, &diag), &diag);
     groom_fit_destroy(fit);
     return groom;
 }
@@ -71,27 +50,19 @@ static void turn_sample(struct groom_sample *sample, const double r[3][3])
 
 static void compare(const char *style, const char *what, double most, const struct groom *a, const struct groom *b)
 {
-    double worst = 0;
-    const char *name = "", *of = "";
-    uint32_t n;
-    for (uint32_t o = 0; o < a->n_operators; o++) {
-        const struct groom_operator_parameter *p = groom_operator_parameters(a->operators[o].type, &n);
-        for (uint32_t k = 0; k < n; k++) {
-            double x = (double)a->operators[o].parameter[k], y = (double)b->operators[o].parameter[k];
-            double off = x != y ? 100 * fabs(y - x) / fmax(fabs(x), 1e-12) : 0;
-            if (off > worst) {
-                worst = off;
-                name = p[k].name;
-                of = groom_operator_name(a->operators[o].type);
-            }
-        }
-    }
-    printf("figure invariance_%s_%s %.2f %% %s.%s moves most; at most %g\n", style, what, worst, of, name, most);
+    struct known_parameter parameter[KNOWN_PARAMETERS], *worst = parameter;
+    uint32_t n = known_parameters(b, a, parameter);
+    for (uint32_t k = 1; k < n; k++)
+        worst = fabs(parameter[k].error) > fabs(worst->error) ? &parameter[k] : worst;
+    printf("figure invariance_%s_%s %.2f %% %s.%s moves most; at most %g\n", style, what, fabs(worst->error), worst->of, worst->name, most);
     fflush(stdout);
 }
 
-static void judge(groom_sample_style style, uint32_t n, int automatic, const struct groom_context *context)
+static void judge(groom_sample_style style, const struct known_run *run)
 {
+    const struct groom_context *context = run->context;
+    uint32_t n = run->n_strands;
+    int automatic = strcmp(run->more[0], "auto") == 0;
     static const double upright[3][3] = {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}};
     static const double slanted[3][3] = {{0.36, 0.48, -0.8}, {-0.8, 0.6, 0}, {0.48, 0.64, 0.6}};
     const char *name = groom_sample_style_name(style);
@@ -107,7 +78,7 @@ static void judge(groom_sample_style style, uint32_t n, int automatic, const str
         if (way == 1 || way == 2)
             turn_sample(same, way == 1 ? upright : slanted);
         if (way == 4)
-            require(groom_evaluate(first, 0, n, same->capture->points, context, &diag), &diag);
+            known_must(groom_evaluate(first, 0, n, same->capture->points, context, &diag), &diag);
         other = fitted(same, way == 3 ? 78 : 77, automatic, context);
         compare(name, ways[way], most[way], first, other);
         groom_destroy(other);
@@ -117,16 +88,4 @@ static void judge(groom_sample_style style, uint32_t n, int automatic, const str
     groom_sample_destroy(sample);
 }
 
-int main(int argc, char **argv)
-{
-    uint32_t n = argc > 1 ? (uint32_t)atoi(argv[1]) : 3000;
-    struct groom_pool *pool;
-    struct groom_diag diag = {0};
-    require(groom_pool_create(0, &pool), &diag);
-    struct groom_context context = {.pool = pool};
-    for (int style = 0; style < GROOM_SAMPLE_STYLE_COUNT; style++)
-        if (argc < 3 || strcmp(argv[2], "all") == 0 || strstr(argv[2], groom_sample_style_name((groom_sample_style)style)))
-            judge((groom_sample_style)style, n, argc > 3, &context);
-    groom_pool_destroy(pool);
-    return 0;
-}
+int main(int argc, char **argv) { return known_styles(argc, argv, judge); }

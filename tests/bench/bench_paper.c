@@ -7,16 +7,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
-#include "tests/support/guides.h"
-
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
+#include "tests/support/known.h"
 
 struct run { double seconds[FIT_N_STAGES]; struct groom_fit_report report; };
 
@@ -24,14 +16,7 @@ static void scale_steps(uint32_t *iterations, double share) { *iterations = (uin
 
 static struct groom_fit_options options_of(const struct groom_sample *sample, groom_fit_method method, double share)
 {
-    struct groom_fit_options options;
-    groom_fit_options_init(GROOM_FIT_STANDARD, &options);
-    options.guides = sample->truth->n_guides;
-    options.operator_guides = sample->truth->n_operator_guides;
-    options.operators_auto = 0;
-    options.n_operators = sample->truth->n_operators;
-    for (uint32_t o = 0; o < options.n_operators; o++)
-        options.operators[o] = sample->truth->operators[o].type;
+    struct groom_fit_options options = known_options(sample, 0);
     options.stages.instance_weights.method = options.stages.guides.method = method;
     options.stages.operators.method = options.stages.randoms.method = method;
     scale_steps(&options.stages.instance_weights.iterations, share);
@@ -50,9 +35,9 @@ static struct run fit_by(const struct groom_sample *sample, groom_fit_method met
     struct run run = {0};
     struct groom_fit *fit = guides_fit(sample, &options, "initialize", context);
     for (uint32_t stage = 0; stage < FIT_N_STAGES; stage++) {
-        double start = now();
+        double start = known_seconds();
         guides_fit_on(fit, stage + 1 < FIT_N_STAGES ? groom_fit_stage_name(stage + 1) : "", context);
-        run.seconds[stage] = now() - start;
+        run.seconds[stage] = known_seconds() - start;
         fprintf(stderr, "bench_paper: %s, %s: %.2f s\n", method == GROOM_FIT_PAPER ? "paper" : "ours",
                 groom_fit_stage_name(stage), run.seconds[stage]);
     }
