@@ -28,9 +28,9 @@ void grooms_destroy(struct grooms *grooms)
 {
     if (!grooms)
         return;
-    models_destroy(grooms->models);
+    cache_destroy(grooms->models);
     states_destroy(grooms->states);
-    heads_destroy(grooms->heads);
+    cache_destroy(grooms->heads);
     pthread_mutex_destroy(&grooms->comparing);
     free(grooms);
 }

@@ -17,50 +17,23 @@
 #define CONVERT_FILE ((uint64_t)4 << 30)
 
 struct head {
-    char id[STORE_ID_SIZE];
+    struct cache_entry entry; /* its key is the head's id; its bytes are not counted: there are few */
     struct groom_mesh *mesh;
     struct groom_bvh *bvh;
-    unsigned n_users;
-    uint64_t last_used;
-    struct head *next;
 };
 
-struct heads {
-    pthread_mutex_t lock;
-    struct head *first;
-    uint64_t clock;
-};
+static struct head *head_of(struct cache_entry *entry) { return (struct head *)entry; }
 
-groom_status heads_create(struct heads **out)
+static void free_head(struct cache_entry *entry)
 {
-    struct heads *heads = calloc(1, sizeof *heads);
-    if (!heads)
-        return GROOM_ENOMEM;
-    pthread_mutex_init(&heads->lock, NULL);
-    *out = heads;
-    return GROOM_OK;
-}
-
-static void free_head(struct head *head)
-{
-    if (!head)
-        return;
-    groom_bvh_destroy(head->bvh);
-    groom_mesh_destroy(head->mesh);
-    free(head);
-}
-
-void heads_destroy(struct heads *heads)
-{
-    if (!heads)
-        return;
-    for (struct head *head = heads->first, *next; head; head = next) {
-        next = head->next;
-        free_head(head);
+    if (entry) {
+        groom_bvh_destroy(head_of(entry)->bvh);
+        groom_mesh_destroy(head_of(entry)->mesh);
     }
-    pthread_mutex_destroy(&heads->lock);
-    free(heads);
+    free(entry);
 }
+
+groom_status heads_create(struct cache **heads) { return cache_create(SIZE_MAX, MOST_HEADS, free_head, heads); }
 
 const struct groom_bvh *head_surface(const struct head *head) { return head->bvh; }
 
@@ -114,69 +87,22 @@ static groom_status load(struct grooms *grooms, const struct store_asset *asset,
 
 /* --- what others call ---------------------------------------------------------------------------- */
 
-/* With the lock held. */
-static struct head *find(struct heads *heads, const char *id)
-{
-    for (struct head *head = heads->first; head; head = head->next)
-        if (strcmp(head->id, id) == 0) {
-            head->n_users++;
-            head->last_used = ++heads->clock;
-            return head;
-        }
-    return NULL;
-}
-
-/* With the lock held. */
-static void make_room(struct heads *heads)
-{
-    size_t n = 0;
-    struct head **oldest = NULL;
-    for (struct head **link = &heads->first; *link; link = &(*link)->next, n++)
-        if ((*link)->n_users == 0 && (!oldest || (*link)->last_used < (*oldest)->last_used))
-            oldest = link;
-    if (n <= MOST_HEADS || !oldest)
-        return;
-    struct head *head = *oldest;
-    *oldest = head->next;
-    free_head(head);
-}
-
 groom_status heads_acquire(struct grooms *grooms, const char *id, struct head **out, struct groom_diag *diag)
 {
-    struct heads *heads = grooms->heads;
     struct store_asset asset = {0};
-    pthread_mutex_lock(&heads->lock);
-    *out = find(heads, id);
-    pthread_mutex_unlock(&heads->lock);
+    *out = head_of(cache_get(grooms->heads, id));
     if (*out || store_asset_get(grooms->options.store, NULL, STORE_HEAD, id, &asset, NULL) != GROOM_OK)
         return GROOM_OK; /* a groom from elsewhere: its head is not here */
     struct head *made = calloc(1, sizeof *made);
     groom_status status = made ? load(grooms, &asset, made, diag) : groom_fail(diag, GROOM_ENOMEM, "no memory for a head");
     store_asset_finish(&asset);
     if (status != GROOM_OK) {
-        free_head(made);
+        free_head((struct cache_entry *)made);
         return status;
     }
-    strncpy(made->id, id, sizeof made->id - 1);
-    pthread_mutex_lock(&heads->lock);
-    if (!(*out = find(heads, id))) {
-        made->next = heads->first;
-        heads->first = made;
-        *out = find(heads, id);
-        made = NULL;
-        make_room(heads);
-    }
-    pthread_mutex_unlock(&heads->lock);
-    free_head(made);
+    strncpy(made->entry.key, id, sizeof made->entry.key - 1);
+    *out = head_of(cache_keep(grooms->heads, &made->entry));
     return GROOM_OK;
 }
 
-void heads_release(struct grooms *grooms, struct head *head)
-{
-    if (!head)
-        return;
-    pthread_mutex_lock(&grooms->heads->lock);
-    head->n_users--;
-    make_room(grooms->heads);
-    pthread_mutex_unlock(&grooms->heads->lock);
-}
+void heads_release(struct grooms *grooms, struct head *head) { cache_put_back(grooms->heads, (struct cache_entry *)head); }

@@ -46,7 +46,7 @@ static groom_status open_upload(struct subject *subject, const struct grooms_lay
     if (status == GROOM_OK) {
         strncpy(subject->own->name, name, sizeof subject->own->name - 1);
         strncpy(subject->own->base_strands, edit->strands_id, sizeof subject->own->base_strands - 1);
-        memcpy(subject->upload_key[0], subject->upload->key, STORE_HASH_SIZE);
+        memcpy(subject->upload_key[0], subject->upload->entry.key, STORE_HASH_SIZE);
         subject->keys = subject->upload_key;
         subject->groom = subject->own;
         subject->head = wish->head ? wish->head : "";

@@ -1,46 +1,27 @@
-/* Decoded models, least recently used out first. */
+/* Decoded models. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/grooms/room.h"
 
-struct models {
-    pthread_mutex_t lock;
-    struct model *first;
-    size_t n_bytes, max_bytes;
-    uint64_t clock;
-};
+/* Edits and exports come back to the grooms of this hour; more would be searched in vain. */
+#define MOST_MODELS 64
 
-groom_status models_create(size_t max_bytes, struct models **out)
+static struct model *model_of(struct cache_entry *entry) { return (struct model *)entry; }
+
+static void free_model(struct cache_entry *entry)
 {
-    struct models *models = calloc(1, sizeof *models);
-    if (!models)
-        return GROOM_ENOMEM;
-    models->max_bytes = max_bytes;
-    pthread_mutex_init(&models->lock, NULL);
-    *out = models;
-    return GROOM_OK;
+    if (entry) {
+        groom_destroy(model_of(entry)->groom);
+        free(model_of(entry)->keys);
+    }
+    free(entry);
 }
 
-static void free_model(struct model *model)
+groom_status models_create(size_t max_bytes, struct cache **models)
 {
-    if (model) {
-        groom_destroy(model->groom);
-        free(model->keys);
-    }
-    free(model);
-}
-
-void models_destroy(struct models *models)
-{
-    if (!models)
-        return;
-    for (struct model *model = models->first, *next; model; model = next) {
-        next = model->next;
-        free_model(model);
-    }
-    pthread_mutex_destroy(&models->lock);
-    free(models);
+    return cache_create(max_bytes, MOST_MODELS, free_model, models);
 }
 
 static size_t size_of(const struct groom *groom)
@@ -53,50 +34,6 @@ static size_t size_of(const struct groom *groom)
             bytes += 20 * ((size_t)layer->anchors.n + layer->contact.n) + (layer->target ? layer->target->n_vertices * 12 : 0);
     }
     return bytes + (size_t)groom->n_base * 12;
-}
-
-/* --- with the lock held ------------------------------------------------------------------ */
-
-static struct model *find(struct models *models, const char *groom_id, uint32_t revision)
-{
-    for (struct model *model = models->first; model; model = model->next)
-        if (model->revision == revision && strcmp(model->groom_id, groom_id) == 0)
-            return model;
-    return NULL;
-}
-
-static void use(struct models *models, struct model *model)
-{
-    model->n_users++;
-    model->last_used = ++models->clock;
-}
-
-/* The link to the model that has not been used for longest and is not in use, or NULL. */
-static struct model **oldest(struct models *models)
-{
-    struct model **found = NULL;
-    for (struct model **link = &models->first; *link; link = &(*link)->next)
-        if ((*link)->n_users == 0 && (!found || (*link)->last_used < (*found)->last_used))
-            found = link;
-    return found;
-}
-
-static void make_room(struct models *models)
-{
-    struct model **link;
-    while (models->n_bytes > models->max_bytes && (link = oldest(models)) != NULL) {
-        struct model *model = *link;
-        *link = model->next;
-        models->n_bytes -= model->n_bytes;
-        free_model(model);
-    }
-}
-
-static void insert(struct models *models, struct model *model)
-{
-    model->next = models->first;
-    models->first = model;
-    models->n_bytes += model->n_bytes;
 }
 
 /* --- reading one from the store ------------------------------------------------------------ */
@@ -140,14 +77,14 @@ static groom_status load(struct grooms *grooms, const char *groom_id, uint32_t n
         goto out;
     memcpy(model->groom_id, revision.groom_id, sizeof model->groom_id);
     model->revision = revision.number;
-    model->n_bytes = size_of(model->groom);
+    model->entry.n_bytes = sizeof *model + size_of(model->groom);
     note_head(model, document);
     *out = model;
     model = NULL;
 out:
     cJSON_Delete(document);
     store_revision_finish(&revision);
-    free_model(model);
+    free_model((struct cache_entry *)model);
     return status;
 }
 
@@ -170,45 +107,19 @@ static groom_status resolve(struct grooms *grooms, const char *groom_id, uint32_
 groom_status models_acquire(struct grooms *grooms, const char *groom_id, uint32_t number, struct model **out,
                             struct groom_diag *diag)
 {
-    struct models *models = grooms->models;
+    char key[CACHE_KEY_SIZE];
     struct model *loaded = NULL;
     groom_status status = resolve(grooms, groom_id, &number, diag);
     if (status != GROOM_OK)
         return status;
-
-    pthread_mutex_lock(&models->lock);
-    struct model *model = find(models, groom_id, number);
-    if (model)
-        use(models, model);
-    pthread_mutex_unlock(&models->lock);
-    if (model) {
-        *out = model;
+    snprintf(key, sizeof key, "%s/%u", groom_id, number);
+    if ((*out = model_of(cache_get(grooms->models, key))) != NULL)
         return GROOM_OK;
-    }
-
-    /* Decoded without the lock; should another thread have been faster, its model is taken. */
     if ((status = load(grooms, groom_id, number, &loaded, diag)) != GROOM_OK)
         return status;
-    pthread_mutex_lock(&models->lock);
-    model = find(models, groom_id, number);
-    if (!model) {
-        insert(models, model = loaded);
-        loaded = NULL;
-    }
-    use(models, model);
-    make_room(models);
-    pthread_mutex_unlock(&models->lock);
-    free_model(loaded);
-    *out = model;
+    memcpy(loaded->entry.key, key, sizeof key);
+    *out = model_of(cache_keep(grooms->models, &loaded->entry));
     return GROOM_OK;
 }
 
-void models_release(struct grooms *grooms, struct model *model)
-{
-    if (!model)
-        return;
-    pthread_mutex_lock(&grooms->models->lock);
-    model->n_users--;
-    make_room(grooms->models);
-    pthread_mutex_unlock(&grooms->models->lock);
-}
+void models_release(struct grooms *grooms, struct model *model) { cache_put_back(grooms->models, (struct cache_entry *)model); }

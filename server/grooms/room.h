@@ -8,16 +8,15 @@
 #include "groom/document.h"
 #include "groom/groom.h"
 #include "groom/layers.h"
+#include "server/cache.h"
 #include "server/grooms/grooms.h"
-
-struct models;
 
 struct grooms {
     struct grooms_options options;
     struct groom_context context; /* for evaluation: the pool */
-    struct models *models;
+    struct cache *models;
     struct states *states;
-    struct heads *heads;
+    struct cache *heads;
     pthread_mutex_t comparing;    /* one comparison at a time: each uses all processors */
 };
 
@@ -50,21 +49,16 @@ void arrays_use(struct arrays *arrays, const cJSON *document);
 
 /* --- decoded models (models.c) ------------------------------------------------------------ */
 
-/* A bounded cache, least recently used out first. A model that is in use stays. */
 struct model {
+    struct cache_entry entry;
     char groom_id[STORE_ID_SIZE];
     uint32_t revision;
     char head[STORE_ID_SIZE]; /* of its document's source, or "" */
     struct groom *groom;
     char (*keys)[STORE_HASH_SIZE]; /* [n_operators + 1] of the strands before each operator, and behind the last */
-    size_t n_bytes;
-    unsigned n_users;
-    uint64_t last_used;
-    struct model *next;
 };
 
-groom_status models_create(size_t max_bytes, struct models **models);
-void models_destroy(struct models *models);
+groom_status models_create(size_t max_bytes, struct cache **models);
 /* The model of a revision (0: the latest), to be released. */
 groom_status models_acquire(struct grooms *grooms, const char *groom_id, uint32_t revision, struct model **model,
                             struct groom_diag *diag);
@@ -80,15 +74,11 @@ groom_status select_fairly(const struct groom *groom, uint32_t count, struct gro
 /* --- dense strands that were computed (states.c) ----------------------------------------------- */
 
 /* Strands at a place of a chain, under the hash of all that they come from: another revision, or another
- * groom, with the same beginning finds them. A bounded cache as above. */
+ * groom, with the same beginning finds them. */
 struct state {
-    char key[STORE_HASH_SIZE];
+    struct cache_entry entry;
     struct groom_strands *strands;
     struct groom_layer_input *input; /* of a layer that was tried here last; states_take_input */
-    size_t n_bytes;
-    unsigned n_users;
-    uint64_t last_used;
-    struct state *next;
 };
 
 groom_status states_create(size_t max_bytes, struct states **states);
@@ -124,8 +114,7 @@ struct head;
 groom_status heads_acquire(struct grooms *grooms, const char *id, struct head **head, struct groom_diag *diag);
 void heads_release(struct grooms *grooms, struct head *head); /* takes NULL */
 const struct groom_bvh *head_surface(const struct head *head);
-groom_status heads_create(struct heads **heads);
-void heads_destroy(struct heads *heads);
+groom_status heads_create(struct cache **heads);
 
 /* --- one edit under way (edit.c) ---------------------------------------------------------------------- */
 

@@ -1,142 +1,88 @@
-/* Dense strands that were computed, least recently used out first. */
+/* Dense strands that were computed. */
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/grooms/room.h"
 
+/* A few places of each chain of MOST_MODELS grooms. */
+#define MOST_STATES 256
+
 struct states {
-    pthread_mutex_t lock;
-    struct state *first;
-    size_t n_bytes, max_bytes;
-    uint64_t clock;
+    struct cache *cache;
+    pthread_mutex_t inputs; /* of every state's `input` */
 };
+
+static struct state *state_of(struct cache_entry *entry) { return (struct state *)entry; }
+
+static void free_state(struct cache_entry *entry)
+{
+    groom_strands_destroy(state_of(entry)->strands);
+    groom_layer_input_destroy(state_of(entry)->input);
+    free(entry);
+}
 
 groom_status states_create(size_t max_bytes, struct states **out)
 {
     struct states *states = calloc(1, sizeof *states);
-    if (!states)
+    if (!states || cache_create(max_bytes, MOST_STATES, free_state, &states->cache) != GROOM_OK) {
+        free(states);
         return GROOM_ENOMEM;
-    states->max_bytes = max_bytes;
-    pthread_mutex_init(&states->lock, NULL);
+    }
+    pthread_mutex_init(&states->inputs, NULL);
     *out = states;
     return GROOM_OK;
-}
-
-static void free_state(struct state *state)
-{
-    groom_strands_destroy(state->strands);
-    groom_layer_input_destroy(state->input);
-    free(state);
 }
 
 void states_destroy(struct states *states)
 {
     if (!states)
         return;
-    for (struct state *state = states->first, *next; state; state = next) {
-        next = state->next;
-        free_state(state);
-    }
-    pthread_mutex_destroy(&states->lock);
+    cache_destroy(states->cache);
+    pthread_mutex_destroy(&states->inputs);
     free(states);
 }
 
-/* --- with the lock held ----------------------------------------------------------------- */
+struct state *states_find(struct states *states, const char *key) { return state_of(cache_get(states->cache, key)); }
 
-static struct state *find(struct states *states, const char *key)
+static size_t bytes_of(const struct state *state)
 {
-    for (struct state *state = states->first; state; state = state->next)
-        if (strcmp(state->key, key) == 0) {
-            state->n_users++;
-            state->last_used = ++states->clock;
-            return state;
-        }
-    return NULL;
+    return sizeof *state + (size_t)state->strands->n_vertices * 12 + (size_t)state->strands->n_strands * 4 +
+           (state->input ? groom_layer_input_bytes(state->input) : 0);
 }
 
-static void make_room(struct states *states)
+groom_status states_keep(struct states *states, const char *key, struct groom_strands *strands, struct state **state)
 {
-    while (states->n_bytes > states->max_bytes) {
-        struct state **oldest = NULL;
-        for (struct state **link = &states->first; *link; link = &(*link)->next)
-            if ((*link)->n_users == 0 && (!oldest || (*link)->last_used < (*oldest)->last_used))
-                oldest = link;
-        if (!oldest)
-            return;
-        struct state *state = *oldest;
-        *oldest = state->next;
-        states->n_bytes -= state->n_bytes;
-        free_state(state);
-    }
-}
-
-/* --- what others call ------------------------------------------------------------------------ */
-
-struct state *states_find(struct states *states, const char *key)
-{
-    pthread_mutex_lock(&states->lock);
-    struct state *state = find(states, key);
-    pthread_mutex_unlock(&states->lock);
-    return state;
-}
-
-groom_status states_keep(struct states *states, const char *key, struct groom_strands *strands, struct state **out)
-{
-    struct state *made = calloc(1, sizeof *made), *state;
+    struct state *made = calloc(1, sizeof *made);
     if (!made) {
         groom_strands_destroy(strands);
         return GROOM_ENOMEM;
     }
-    strncpy(made->key, key, sizeof made->key - 1);
+    strncpy(made->entry.key, key, sizeof made->entry.key - 1);
     made->strands = strands;
-    made->n_bytes = sizeof *made + (size_t)strands->n_vertices * 12 + (size_t)strands->n_strands * 4;
-    pthread_mutex_lock(&states->lock);
-    if (!(state = find(states, key))) { /* else another thread was faster, with the same bits */
-        made->next = states->first;
-        states->first = made;
-        states->n_bytes += made->n_bytes;
-        state = find(states, key);
-        made = NULL;
-        make_room(states);
-    }
-    pthread_mutex_unlock(&states->lock);
-    if (made)
-        free_state(made);
-    *out = state;
+    made->entry.n_bytes = bytes_of(made);
+    *state = state_of(cache_keep(states->cache, &made->entry)); /* or another thread's, with the same bits */
     return GROOM_OK;
 }
 
-void states_release(struct states *states, struct state *state)
-{
-    if (!state)
-        return;
-    pthread_mutex_lock(&states->lock);
-    state->n_users--;
-    make_room(states);
-    pthread_mutex_unlock(&states->lock);
-}
+void states_release(struct states *states, struct state *state) { cache_put_back(states->cache, (struct cache_entry *)state); }
 
-static size_t input_bytes(const struct groom_layer_input *input) { return input ? groom_layer_input_bytes(input) : 0; }
+/* Put another input in its place and return the one that was there. */
+static struct groom_layer_input *exchange(struct states *states, struct state *state, struct groom_layer_input *input)
+{
+    pthread_mutex_lock(&states->inputs);
+    struct groom_layer_input *before = state->input;
+    state->input = input;
+    cache_resize(states->cache, &state->entry, bytes_of(state));
+    pthread_mutex_unlock(&states->inputs);
+    return before;
+}
 
 struct groom_layer_input *states_take_input(struct states *states, struct state *state)
 {
-    pthread_mutex_lock(&states->lock);
-    struct groom_layer_input *input = state->input;
-    state->input = NULL;
-    state->n_bytes -= input_bytes(input);
-    states->n_bytes -= input_bytes(input);
-    pthread_mutex_unlock(&states->lock);
-    return input;
+    return exchange(states, state, NULL);
 }
 
 void states_give_input(struct states *states, struct state *state, struct groom_layer_input *input)
 {
-    pthread_mutex_lock(&states->lock);
-    struct groom_layer_input *before = state->input;
-    state->input = input;
-    state->n_bytes += input_bytes(input) - input_bytes(before);
-    states->n_bytes += input_bytes(input) - input_bytes(before);
-    make_room(states);
-    pthread_mutex_unlock(&states->lock);
-    groom_layer_input_destroy(before);
+    groom_layer_input_destroy(exchange(states, state, input));
 }
