@@ -10,7 +10,7 @@ import { after, before, test } from 'node:test';
 import { groomctl, startDaemon, until } from '../support/daemon.mjs';
 import { startCluster } from './slurm.mjs';
 
-const options = { timeout: 600000 };
+const options = { timeout: 600000 }, whole = { timeout: 3600000 };
 const size = process.env.CLUSTER_STRANDS ?? '20000', guides = process.env.CLUSTER_GUIDES ?? '1000';
 let folder, undisturbed;
 
@@ -69,7 +69,7 @@ test('on this machine', options, async (t) => {
   undisturbed = await strandsOf(daemon, await ended(daemon, await submit(daemon)));
 });
 
-test('on a cluster', options, async (t) => {
+test('on a cluster', whole, async (t) => {
   const cluster = await startCluster(t);
 
   await t.test('two fits run on two nodes and end with the same bits', options, async (t) => {
