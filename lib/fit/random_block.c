@@ -7,7 +7,7 @@
 
 /* --- life ------------------------------------------------------------------------------- */
 
-static size_t memory_lanes(uint32_t m) { return (size_t)(4 + 3 + 3 * RANDOM_BLOCK_WEIGHTS) * m + STRAND_ERROR_SCRATCH(m); }
+static size_t memory_lanes(uint32_t m) { return (size_t)(4 + 4 + 3 * RANDOM_BLOCK_WEIGHTS) * m + STRAND_ERROR_SCRATCH(m); }
 
 groom_status random_block_memory_init(struct random_search_memory *memory, uint32_t m, uint32_t n_active,
                                       const struct groom_allocator *allocator)
@@ -21,7 +21,7 @@ groom_status random_block_memory_init(struct random_search_memory *memory, uint3
     memory->target.inverse_chord = memory->target.point + (size_t)3 * m;
     memory->scratch = memory->target.inverse_chord + m;
     memory->blend = memory->scratch + STRAND_ERROR_SCRATCH(m);
-    memory->toward = memory->blend + (size_t)3 * m;
+    memory->toward = memory->blend + (size_t)4 * m;
     return GROOM_OK;
 }
 
@@ -41,15 +41,10 @@ struct block random_block_range(uint32_t first, uint32_t n)
     return block_of(strand, n < LANES ? n : LANES);
 }
 
-static lanes *state_of(const struct random_search *search, const struct random_search_memory *memory, uint32_t index)
-{
-    return memory->w.state + (size_t)3 * search->fit->m * index;
-}
-
 static int is_left_out(const struct random_search *search, uint32_t active) { return search->leave_out >> active & 1; }
 
 static void apply(const struct random_search *search, struct random_search_memory *memory, uint32_t active,
-                  const lanes *x, lanes *y)
+                  struct bundle x, struct bundle y)
 {
     groom_operator_type type = search->plan.groom->operators[search->plan.active[active]].type;
     kernel_of(type)->forward[search->plan.variant](&memory->in[active], x, y, memory->w.scratch);
@@ -76,11 +71,13 @@ void random_block_advance(const struct random_search *search, struct random_sear
                           uint32_t active)
 {
     for (uint32_t a = from; a < active; a++) {
-        lanes *x = state_of(search, memory, a), *y = state_of(search, memory, a + 1);
-        if (is_left_out(search, a))
-            memcpy(y, x, (size_t)3 * search->fit->m * sizeof *y);
-        else
-            apply(search, memory, a, (const lanes *)x, y);
+        struct bundle x = workspace_state(&memory->w, a), y = workspace_state(&memory->w, a + 1);
+        if (is_left_out(search, a)) {
+            memcpy(y.points, x.points, (size_t)3 * search->fit->m * sizeof *y.points);
+            memcpy(y.at, x.at, search->fit->m * sizeof *y.at);
+        } else {
+            apply(search, memory, a, x, y);
+        }
     }
 }
 
@@ -94,36 +91,34 @@ void random_block_load(const struct random_search *search, struct random_search_
     random_block_advance(search, memory, 0, active);
 }
 
-const lanes *random_block_before(const struct random_search *search, const struct random_search_memory *memory,
-                                 uint32_t active)
+struct bundle random_block_before(const struct random_search_memory *memory, uint32_t active)
 {
-    return (const lanes *)state_of(search, memory, active);
+    return workspace_state(&memory->w, active);
 }
 
-const lanes *random_block_start(const struct random_search *search, const struct random_search_memory *memory)
-{
-    return random_block_before(search, memory, 0);
-}
+struct bundle random_block_start(const struct random_search_memory *memory) { return random_block_before(memory, 0); }
 
-static const lanes *finish(const struct random_search *search, struct random_search_memory *memory, const lanes *x,
+static const lanes *finish(const struct random_search *search, struct random_search_memory *memory, struct bundle x,
                            uint32_t active, uint32_t leave_out)
 {
-    lanes *y = state_of(search, memory, search->plan.n_active + 1), *z = state_of(search, memory, search->plan.n_active + 2);
-    for (uint32_t a = active; a < search->plan.n_active; a++) {
+    uint32_t n = search->plan.n_active, spare = n + 1;
+    for (uint32_t a = active; a < n; a++) {
         if (leave_out >> a & 1)
             continue;
+        struct bundle y = workspace_state(&memory->w, spare);
+        if (a + 1 == n)
+            y.at = NULL;
         apply(search, memory, a, x, y);
-        x = (const lanes *)y;
-        lanes *swap = y;
-        y = z, z = swap;
+        x = y;
+        spare = spare == n + 1 ? n + 2 : n + 1;
     }
-    return x;
+    return (const lanes *)x.points;
 }
 
 void random_block_lengths(const struct random_search *search, struct random_search_memory *memory, uint32_t active,
                           float *length)
 {
-    const lanes *x = finish(search, memory, random_block_before(search, memory, active), active, 0);
+    const lanes *x = finish(search, memory, random_block_before(memory, active), active, 0);
     memset(length, 0, sizeof(lanes));
     for (uint32_t j = 0; j + 1 < search->fit->m; j++, x += 3)
         FOR_LANES(l)
@@ -133,11 +128,11 @@ void random_block_lengths(const struct random_search *search, struct random_sear
         }
 }
 
-void random_block_evaluate(const struct random_search *search, struct random_search_memory *memory, const lanes *x,
+void random_block_evaluate(const struct random_search *search, struct random_search_memory *memory, struct bundle x,
                            uint32_t active, float *error)
 {
-    x = finish(search, memory, x, active, search->leave_out);
-    strand_error(search->plan.variant, search->fit->m, x, &memory->target, &search->weights, memory->scratch, error);
+    const lanes *y = finish(search, memory, x, active, search->leave_out);
+    strand_error(search->plan.variant, search->fit->m, y, &memory->target, &search->weights, memory->scratch, error);
 }
 
 /* --- instancing weights ---------------------------------------------------------------------- */
@@ -182,17 +177,19 @@ void random_block_load_weights(const struct random_search *search, struct random
             FOR_LANES(l) memory->toward[(size_t)a * points + i][l] -= memory->blend[i][l];
 }
 
-const lanes *random_block_blend(const struct random_search *search, struct random_search_memory *memory, uint32_t n,
-                                lanes *more)
+struct bundle random_block_blend(const struct random_search *search, struct random_search_memory *memory, uint32_t n,
+                                 lanes *more)
 {
-    uint32_t points = 3 * search->fit->m;
-    const lanes *from = random_block_start(search, memory);
+    uint32_t m = search->fit->m, points = 3 * m;
+    const lanes *from = (const lanes *)random_block_start(memory).points;
+    struct bundle blend = {.points = memory->blend, .at = memory->blend + points};
     for (uint32_t a = 0; a < n; a++, from = (const lanes *)memory->blend) {
         const lanes *toward = (const lanes *)memory->toward + (size_t)a * points;
         for (uint32_t i = 0; i < points; i++)
             FOR_LANES(l) memory->blend[i][l] = from[i][l] + more[a][l] * toward[i][l];
     }
-    return (const lanes *)memory->blend;
+    kernel_measures[search->plan.variant](m, (const lanes *)blend.points, blend.at);
+    return blend;
 }
 
 void random_block_confine(const struct random_search_memory *memory, uint32_t n, lanes *more)

@@ -15,7 +15,7 @@ struct random_search_memory {
     lanes *memory;             /* of all that follows */
     struct strand_error_target target;
     lanes *scratch;            /* of strand_error */
-    lanes *blend;              /* [3m] the block with other weights */
+    lanes *blend;              /* [3m] the block with other weights, and [m] its arc lengths */
     lanes *toward;             /* [RANDOM_BLOCK_WEIGHTS][3m] what a weight of 1 more adds to it */
     lanes weight[RANDOM_BLOCK_WEIGHTS + 1]; /* as they were; the last: that which pays for the others */
     uint32_t other[LANES][RANDOM_BLOCK_WEIGHTS + 1]; /* which of a strand's k they are */
@@ -32,12 +32,11 @@ struct block random_block_range(uint32_t first, uint32_t n);
 void random_block_load(const struct random_search *search, struct random_search_memory *memory, const struct block *block,
                        uint32_t active);
 /* What random_block_load has made: the strands before any operator. */
-const lanes *random_block_start(const struct random_search *search, const struct random_search_memory *memory);
+struct bundle random_block_start(const struct random_search_memory *memory);
 /* The strands before an active operator. */
-const lanes *random_block_before(const struct random_search *search, const struct random_search_memory *memory,
-                                 uint32_t active);
+struct bundle random_block_before(const struct random_search_memory *memory, uint32_t active);
 /* From x, the strands before operator `active`, on, with the inputs as they are in memory->in. error: one a lane */
-void random_block_evaluate(const struct random_search *search, struct random_search_memory *memory, const lanes *x,
+void random_block_evaluate(const struct random_search *search, struct random_search_memory *memory, struct bundle x,
                            uint32_t active, float *error);
 
 /* Again from operator `from` to the one that random_block_load was told, with the inputs as they are now. */
@@ -52,8 +51,8 @@ void random_block_lengths(const struct random_search *search, struct random_sear
 void random_block_load_weights(const struct random_search *search, struct random_search_memory *memory,
                                const struct block *block, uint32_t n);
 /* The strands before any operator with weights moved by more [n]. */
-const lanes *random_block_blend(const struct random_search *search, struct random_search_memory *memory, uint32_t n,
-                                lanes *more);
+struct bundle random_block_blend(const struct random_search *search, struct random_search_memory *memory, uint32_t n,
+                                 lanes *more);
 /* Moves such that all weights stay at least 0 and sum to what they did. */
 void random_block_confine(const struct random_search_memory *memory, uint32_t n, lanes *more);
 void random_block_store_weights(const struct random_search *search, const struct random_search_memory *memory,

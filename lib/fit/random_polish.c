@@ -61,7 +61,7 @@ static void error_at(struct polish *polish, lanes value[MOST], lanes error)
 {
     const struct random_search *search = polish->job->search;
     struct random_search_memory *memory = polish->memory;
-    const lanes *start = random_block_start(search, memory);
+    struct bundle start = random_block_start(memory);
     for (uint32_t i = 0; i < polish->n; i++)
         if (!polish->at[i].is_weight)
             memcpy(memory->in[polish->at[i].active].random[0], value[i], sizeof(lanes));

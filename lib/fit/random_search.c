@@ -54,7 +54,7 @@ static void try_values(const struct strands_job *job, struct random_search_memor
 {
     lanes error;
     memcpy(memory->in[job->active].random[0], value, sizeof(lanes));
-    random_block_evaluate(job->search, memory, random_block_before(job->search, memory, job->active), job->active, error);
+    random_block_evaluate(job->search, memory, random_block_before(memory, job->active), job->active, error);
     for (int l = 0; l < LANES; l++)
         if (error[l] < least[l]) {
             least[l] = error[l];
@@ -175,7 +175,7 @@ static void add_costs(const struct curls_job *job, struct random_search_memory *
             lanes error;
             for (int l = 0; l < LANES; l++)
                 in->random[1][l] = phase_at(grid, k);
-            random_block_evaluate(job->search, memory, random_block_before(job->search, memory, job->active), job->active, error);
+            random_block_evaluate(job->search, memory, random_block_before(memory, job->active), job->active, error);
             for (uint32_t l = 0; l < block->n; l++)
                 cost[i * grid->n_phases + k] += (double)error[l];
         }
@@ -264,7 +264,7 @@ static void add_trades(const struct curls_job *job, struct random_search_memory 
                 scale_number(scale, own[l], rate_of(curl, present) / rate_of(curl, rate[t]));
         }
         random_block_advance(job->search, memory, job->groups->scale, job->active);
-        random_block_evaluate(job->search, memory, random_block_before(job->search, memory, job->active), job->active, error);
+        random_block_evaluate(job->search, memory, random_block_before(memory, job->active), job->active, error);
         for (uint32_t l = 0; l < block->n; l++)
             cost[t] += (double)error[l];
     }
@@ -347,7 +347,7 @@ static void follow_block(const struct guides_job *job, struct random_search_memo
     for (uint32_t l = 0; l < block->n; l++)
         best[l] = follows[block->strand[l]];
     random_block_load(job->search, memory, block, 0);
-    random_block_evaluate(job->search, memory, random_block_start(job->search, memory), 0, least);
+    random_block_evaluate(job->search, memory, random_block_start(memory), 0, least);
     for (int l = 0; l < LANES; l++)
         least[l] *= 1 - job->gain;
     for (uint32_t c = 0; c < job->n_candidates; c++) {
@@ -357,7 +357,7 @@ static void follow_block(const struct guides_job *job, struct random_search_memo
                 follows[block->strand[l]] = guide;
         }
         random_block_load(job->search, memory, block, 0);
-        random_block_evaluate(job->search, memory, random_block_start(job->search, memory), 0, error);
+        random_block_evaluate(job->search, memory, random_block_start(memory), 0, error);
         for (uint32_t l = 0; l < block->n; l++)
             if (error[l] < least[l]) {
                 least[l] = error[l];

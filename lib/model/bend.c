@@ -50,34 +50,35 @@ LANES_INLINE void bend_measure(const struct kernel_inputs *in, const lanes *rest
         FOR_LANES(l) bend->axis[c][l] = bend->cosine[l] * in->axis[c][l] + bend->sine[l] * in->axis[3 + c][l];
 }
 
-/* How far each segment has turned: sum of l zeta' up to and with it, and 1 / that of all. */
-LANES_INLINE vec bend_sums(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict scratch)
+/* How far each segment has turned: sum of l zeta' up to and with it, and 1 / that of all. What is bent is
+ * as long as before: at_y = at. */
+LANES_INLINE vec bend_sums(const struct kernel_inputs *in, const lanes *restrict at, lanes *restrict at_y,
+                           lanes *restrict bent)
 {
-    lanes *at = scratch, *bent = scratch + in->m;
-    vec inverse = vec_arc(in->m, x, at), sum = {0}, before = {0};
-    for (uint32_t j = 0; j + 1 < in->m; j++) {
-        vec s = vec_load(at[j + 1]);
+    vec inverse = vec_inverse(vec_load(at[in->m - 1])), sum = {0}, before = {0};
+    if (at_y)
+        vec_store(at_y[0], before);
+    for (uint32_t j = 1; j < in->m; j++) {
+        vec s = vec_load(at[j]);
         sum += (s - before) * vec_begun(s * inverse, in->parameter[START]);
         vec_store(bent[j], sum);
+        if (at_y)
+            vec_store(at_y[j], s);
         before = s;
     }
     return vec_inverse(sum);
 }
 
-LANES_INLINE void bend_forward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,
-                               lanes *restrict scratch)
+/* x~ from the angles rate * bent. */
+LANES_INLINE void bend_turn(uint32_t m, const vec a[3], vec rate, const lanes *restrict bent, const lanes *restrict x,
+                            lanes *restrict y)
 {
-    const lanes *bent = scratch + in->m;
-    vec rate = in->parameter[ANGLE] * TURNS_IN_RADIAN * bend_sums(in, x, scratch), s, c, a[3];
-    vec_sincos_turns(0.5f * vec_load(in->random[0]), &s, &c);
-    for (int k = 0; k < 3; k++)
-        a[k] = c * vec_load(in->axis[k]) + s * vec_load(in->axis[3 + k]);
+    vec px = vec_load(x[0]), py = vec_load(x[1]), pz = vec_load(x[2]), rx = px, ry = py, rz = pz, s, c;
     vec_copy_root(x, y);
-    vec px = vec_load(x[0]), py = vec_load(x[1]), pz = vec_load(x[2]), rx = px, ry = py, rz = pz;
-    for (uint32_t j = 1; j < in->m; j++) {
+    for (uint32_t j = 1; j < m; j++) {
         vec qx = vec_load(x[3 * j]), qy = vec_load(x[3 * j + 1]), qz = vec_load(x[3 * j + 2]);
         vec ex = qx - px, ey = qy - py, ez = qz - pz;
-        vec_sincos_turns(rate * vec_load(bent[j - 1]), &s, &c);
+        vec_sincos_turns(rate * vec_load(bent[j]), &s, &c);
         vec along = (1.0f - c) * (a[0] * ex + a[1] * ey + a[2] * ez);
         rx += c * ex + s * (a[1] * ez - a[2] * ey) + along * a[0];
         ry += c * ey + s * (a[2] * ex - a[0] * ez) + along * a[1];
@@ -85,6 +86,15 @@ LANES_INLINE void bend_forward(const struct kernel_inputs *in, const lanes *rest
         vec_store(y[3 * j], rx), vec_store(y[3 * j + 1], ry), vec_store(y[3 * j + 2], rz);
         px = qx, py = qy, pz = qz;
     }
+}
+
+LANES_INLINE void bend_forward(const struct kernel_inputs *in, struct bundle x, struct bundle y, lanes *scratch)
+{
+    vec rate = in->parameter[ANGLE] * TURNS_IN_RADIAN * bend_sums(in, (const lanes *)x.at, y.at, scratch), s, c, a[3];
+    vec_sincos_turns(0.5f * vec_load(in->random[0]), &s, &c);
+    for (int k = 0; k < 3; k++)
+        a[k] = c * vec_load(in->axis[k]) + s * vec_load(in->axis[3 + k]);
+    bend_turn(in->m, a, rate, (const lanes *)scratch, (const lanes *)x.points, y.points);
 }
 
 /* Tip to root through the rotations. d leaves with the adjoint of segment j in vertex j + 1 and that

@@ -24,15 +24,18 @@ LANES_INLINE void turning(const struct kernel_inputs *in, float *restrict rate, 
     }
 }
 
-LANES_INLINE void curl_forward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,
-                               lanes *restrict scratch)
+/* at_y: measured where it is not NULL */
+LANES_INLINE void curl_vertices(const struct kernel_inputs *in, const lanes *restrict x, const lanes *restrict at,
+                                lanes *restrict y, lanes *restrict at_y)
 {
-    lanes *at = scratch, rates, shifts;
+    lanes rates, shifts;
     float radius = in->parameter[RADIUS], start = in->parameter[START];
-    vec inverse = vec_arc(in->m, x, at);
     turning(in, rates, shifts);
-    vec rate = vec_load(rates), shift = vec_load(shifts), sine, cosine;
+    vec rate = vec_load(rates), shift = vec_load(shifts), inverse = vec_inverse(vec_load(at[in->m - 1])), sine, cosine;
+    struct measure measure = measure_from(x);
     vec_copy_root(x, y);
+    if (at_y)
+        vec_store(at_y[0], measure.length);
     for (uint32_t j = 1; j < in->m; j++) {
         const lanes *p = x + 3 * j, *frame = in->frame + FRAME_WIDTH * j;
         lanes *q = y + 3 * j;
@@ -40,10 +43,24 @@ LANES_INLINE void curl_forward(const struct kernel_inputs *in, const lanes *rest
         vec size = radius * (RADIUS_AT_ROOT + RADIUS_GROWTH * v) * vec_begun(v, start);
         vec_sincos_turns(vec_at_most(s * rate + shift, MANY_TURNS), &sine, &cosine);
         vec along_n = size * sine, along_b = size * cosine;
-        vec_store(q[0], vec_load(p[0]) + (along_n * vec_load(frame[0]) + along_b * vec_load(frame[2])));
-        vec_store(q[1], vec_load(p[1]) + (along_n * vec_load(frame[1]) + along_b * vec_load(frame[3])));
-        vec_store(q[2], vec_load(p[2]) + along_b * vec_load(frame[4]));
+        vec qx = vec_load(p[0]) + (along_n * vec_load(frame[0]) + along_b * vec_load(frame[2]));
+        vec qy = vec_load(p[1]) + (along_n * vec_load(frame[1]) + along_b * vec_load(frame[3]));
+        vec qz = vec_load(p[2]) + along_b * vec_load(frame[4]);
+        vec_store(q[0], qx), vec_store(q[1], qy), vec_store(q[2], qz);
+        if (at_y) {
+            measure_to(&measure, qx, qy, qz);
+            vec_store(at_y[j], measure.length);
+        }
     }
+}
+
+LANES_INLINE void curl_forward(const struct kernel_inputs *in, struct bundle x, struct bundle y, lanes *scratch)
+{
+    (void)scratch;
+    if (y.at)
+        curl_vertices(in, (const lanes *)x.points, (const lanes *)x.at, y.points, y.at);
+    else
+        curl_vertices(in, (const lanes *)x.points, (const lanes *)x.at, y.points, NULL);
 }
 
 LANES_INLINE void curl_backward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,

@@ -36,14 +36,10 @@ static void store_block(const struct evaluation *job, const struct block *block,
 
 static void evaluate_block(const struct evaluation *job, const struct block *block, struct workspace *w)
 {
-    lanes *x = w->state, *y = w->state + 3 * (size_t)job->plan.groom->n_vertices;
     plan_load(&job->plan, block, w);
-    for (uint32_t a = 0; a < job->plan.n_active; a++) {
-        plan_apply(&job->plan, block, w, a, x, y);
-        lanes *swap = x;
-        x = y, y = swap;
-    }
-    store_block(job, block, w->m, x);
+    for (uint32_t a = 0; a < job->plan.n_active; a++)
+        plan_apply(&job->plan, block, w, a, workspace_state(w, a % 2), workspace_state(w, (a + 1) % 2));
+    store_block(job, block, w->m, (const lanes *)workspace_state(w, job->plan.n_active % 2).points);
 }
 
 /* Strands of one block must have as many vertices; and it is well that they share their operator guide. */

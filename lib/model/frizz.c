@@ -15,38 +15,103 @@ LANES_INLINE float place_in_noise(float frequency, float at, float u)
 }
 
 /* chi grows from the root on, so that the root and the tip tell for all. */
-LANES_INLINE int all_cells_known(const float *restrict u, const float *restrict length, float frequency)
+LANES_INLINE int all_near(const float *restrict u, const float *restrict length, float frequency)
 {
-    int known = 1;
+    int near = 1;
     for (int l = 0; l < LANES; l++)
-        known &= u[l] >= 0.0f && noise_is_near(place_in_noise(frequency, length[l], u[l]));
-    return known;
+        near &= u[l] >= 0.0f && place_in_noise(frequency, length[l], u[l]) < (float)NOISE_NEAR;
+    return near;
 }
 
-/* Vertices beyond the root. */
-LANES_INLINE void frizz_vertices(const struct kernel_inputs *in, const float *table, const lanes *restrict x,
-                                 const lanes *restrict at, lanes *restrict y)
+/* Where chi lies in the table. */
+struct noise_place {
+    const float (*cubic[LANES])[QUAD];
+    vec f; /* in the piece */
+};
+
+LANES_INLINE struct noise_place noise_place_of(const float (*table)[QUAD], vec chi)
 {
-    const float offset[3] = NOISE_OFFSETS;
+    struct noise_place place;
+    ivec piece;
+    vec pieces = (float)NOISE_PIECES * chi;
+    place.f = pieces - vec_floor(pieces, &piece);
+    piece *= (int)sizeof *table; /* bytes, for all lanes at once */
+#define CUBIC(l) place.cubic[l] = (const float(*)[QUAD])((const char *)table + piece[l])
+    CUBIC(0), CUBIC(1), CUBIC(2), CUBIC(3);
+#if LANES == 2 * QUAD
+    CUBIC(4), CUBIC(5), CUBIC(6), CUBIC(7);
+#endif
+#undef CUBIC
+    return place;
+}
+
+LANES_INLINE vec noise_cubic(const struct noise_place *place, uint32_t skip)
+{
+    vec c[QUAD], f = place->f;
+    vec_fours(place->cubic, skip, c);
+    return c[0] + f * (c[1] + f * (c[2] + f * c[3]));
+}
+
+/* All vertices are near. at_y: measured where it is not NULL */
+LANES_INLINE void frizz_near(const struct kernel_inputs *in, const lanes *restrict x, const lanes *restrict at,
+                             lanes *restrict y, lanes *restrict at_y)
+{
     float frequency = in->parameter[FREQUENCY], half = 0.5f * in->parameter[AMPLITUDE];
     vec shift = RANDOM_SHIFT * vec_load(in->random[0]);
+    struct measure measure = measure_from(x);
     for (uint32_t j = 1; j < in->m; j++) {
-        vec chi = vec_at_most(frequency * vec_load(at[j]), MANY_TURNS) + shift;
-        for (uint32_t c = 0; c < 3; c++)
-            vec_store(y[3 * j + c], vec_load(x[3 * j + c]) + half * vec_epsilon(table, chi + offset[c]));
+        const lanes *p = x + 3 * j;
+        lanes *q = y + 3 * j;
+        struct noise_place place = noise_place_of(in->noise, frequency * vec_load(at[j]) + shift);
+        vec qx = vec_load(p[0]) + half * noise_cubic(&place, 0);
+        vec qy = vec_load(p[1]) + half * noise_cubic(&place, NOISE_OFFSET_Y);
+        vec qz = vec_load(p[2]) + half * noise_cubic(&place, NOISE_OFFSET_Z);
+        vec_store(q[0], qx), vec_store(q[1], qy), vec_store(q[2], qz);
+        if (at_y) {
+            measure_to(&measure, qx, qy, qz);
+            vec_store(at_y[j], measure.length);
+        }
     }
 }
 
-LANES_INLINE void frizz_forward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,
-                                lanes *restrict scratch)
+/* The same where some are not: those get epsilon itself. */
+LANES_INLINE void frizz_far(const struct kernel_inputs *in, const lanes *restrict x, const lanes *restrict at,
+                            lanes *restrict y, lanes *restrict at_y)
 {
-    lanes *at = scratch;
-    vec_arc(in->m, x, at);
-    vec_copy_root(x, y);
-    if (NOISE_LOOKED_UP && all_cells_known(in->random[0], at[in->m - 1], in->parameter[FREQUENCY]))
-        frizz_vertices(in, in->noise, x, at, y);
+    const float offset[3] = NOISE_OFFSETS;
+    const uint32_t skip[3] = {0, NOISE_OFFSET_Y, NOISE_OFFSET_Z};
+    float frequency = in->parameter[FREQUENCY], half = 0.5f * in->parameter[AMPLITUDE];
+    vec shift = RANDOM_SHIFT * vec_load(in->random[0]), q[3];
+    struct measure measure = measure_from(x);
+    for (uint32_t j = 1; j < in->m; j++) {
+        vec chi = vec_at_most(frequency * vec_load(at[j]), MANY_TURNS) + shift;
+        ivec near = (chi >= 0.0f) & (chi < (float)NOISE_NEAR);
+        struct noise_place place = noise_place_of(in->noise, (vec)((ivec)chi & near));
+        for (uint32_t c = 0; c < 3; c++) {
+            vec epsilon = vec_choose(near, noise_cubic(&place, skip[c]), vec_epsilon(chi + offset[c]));
+            q[c] = vec_load(x[3 * j + c]) + half * epsilon;
+            vec_store(y[3 * j + c], q[c]);
+        }
+        if (at_y) {
+            measure_to(&measure, q[0], q[1], q[2]);
+            vec_store(at_y[j], measure.length);
+        }
+    }
+}
+
+LANES_INLINE void frizz_forward(const struct kernel_inputs *in, struct bundle x, struct bundle y, lanes *scratch)
+{
+    const lanes *points = (const lanes *)x.points, *at = (const lanes *)x.at;
+    (void)scratch;
+    vec_copy_root(points, y.points);
+    if (y.at)
+        vec_store(y.at[0], (vec){0});
+    if (!all_near(in->random[0], at[in->m - 1], in->parameter[FREQUENCY]))
+        frizz_far(in, points, at, y.points, y.at);
+    else if (y.at)
+        frizz_near(in, points, at, y.points, y.at);
     else
-        frizz_vertices(in, NULL, x, at, y);
+        frizz_near(in, points, at, y.points, NULL);
 }
 
 LANES_INLINE void frizz_backward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,
@@ -83,12 +148,6 @@ LANES_INLINE void frizz_backward(const struct kernel_inputs *in, const lanes *re
         adjoints->random[0][l] = RANDOM_SHIFT * d_shift[l];
     }
     arc_backward(m, x, ell, d_chi, NULL, d);
-}
-
-void noise_fill(float gradient[NOISE_CELLS + 1])
-{
-    for (uint32_t i = 0; i <= NOISE_CELLS; i++)
-        gradient[i] = noise_gradient(i * NOISE_STEP);
 }
 
 KERNEL_TABLE(frizz)

@@ -117,11 +117,11 @@ static void forward_block(const struct reverse *r, const struct block *block, st
     float *row[LANES];
     plan_load(&r->plan, block, w);
     for (uint32_t a = 0; a < r->plan.n_active; a++)
-        plan_apply(&r->plan, block, w, a, w->state + a * size, w->state + (a + 1) * size);
+        plan_apply(&r->plan, block, w, a, workspace_state(w, a), workspace_state(w, a + 1));
     plan_roots(&r->plan, block, root);
     for (uint32_t l = 0; l < LANES; l++)
         row[l] = points + l * size;
-    block_to_rows(w->state + r->plan.n_active * size, root, 3 * w->m, row, block->n);
+    block_to_rows((const lanes *)workspace_state(w, r->plan.n_active).points, root, 3 * w->m, row, block->n);
 }
 
 static void load_adjoint(const struct reverse *r, const struct block *block, const float *d_points, lanes *d)
@@ -223,7 +223,8 @@ static void backward_block(const struct reverse *r, const struct block *block, s
     for (uint32_t a = r->plan.n_active; a-- > 0;) {
         struct kernel_inputs in = plan_inputs(&r->plan, block, w, a);
         groom_operator_type type = r->plan.groom->operators[r->plan.active[a]].type;
-        kernel_of(type)->backward[r->plan.variant](&in, w->state + a * size, b->d, &adjoints, w->scratch);
+        kernel_of(type)->backward[r->plan.variant](&in, (const lanes *)workspace_state(w, a).points, b->d, &adjoints,
+                                                      w->scratch);
         keep_share(&adjoints, type, &share[a]);
     }
     store_adjoints(r, block, b, at);

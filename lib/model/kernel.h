@@ -16,7 +16,7 @@ struct kernel_inputs {
     const lanes *guide; /* [3m] operator guide, in space; where the chain clumps */
     const lanes *frame; /* [FRAME_WIDTH * m]; where the chain curls */
     const lanes *axis;  /* [AXIS_WIDTH]; where the chain bends */
-    const float *noise; /* [NOISE_CELLS + 1] gradients, where the chain frizzes and NOISE_LOOKED_UP */
+    const float (*noise)[4]; /* [NOISE_TABLE], where the chain frizzes */
     float parameter[GROOM_OPERATOR_MAX_PARAMETERS];
     lanes random[GROOM_OPERATOR_MAX_RANDOM];
 };
@@ -28,9 +28,15 @@ struct kernel_adjoints {
     lanes random[GROOM_OPERATOR_MAX_RANDOM];         /* overwritten */
 };
 
-/* y = operator(x). x, y: [3m]; scratch: [KERNEL_SCRATCH(m)]; all distinct. */
-typedef void kernel_forward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,
-                            lanes *restrict scratch);
+/* A block's strands. Each operator measures what it makes, while that is in registers, or knows it from what it
+ * was given: no other need measure it again. */
+struct bundle {
+    lanes *points; /* [3m] */
+    lanes *at;     /* [m] arc length from the root to each vertex; NULL where nobody asks */
+};
+
+/* y = operator(x); x is measured. scratch: [KERNEL_SCRATCH(m)]; all distinct. */
+typedef void kernel_forward(const struct kernel_inputs *in, struct bundle x, struct bundle y, lanes *scratch);
 /* d: [3m], comes as the adjoint of y and leaves as the adjoint of x. */
 typedef void kernel_backward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,
                              struct kernel_adjoints *adjoints, lanes *restrict scratch);
@@ -49,6 +55,10 @@ struct operator_kernels {
     kernel_backward *backward[KERNEL_VARIANTS];
 };
 
+/* The arc lengths of strands that no operator has made. */
+typedef void kernel_measure(uint32_t m, const lanes *restrict x, lanes *restrict at);
+extern kernel_measure *const kernel_measures[KERNEL_VARIANTS];
+
 extern const struct operator_kernels scale_kernels, bend_kernels, curl_kernels, clump_kernels, frizz_kernels;
 
 const struct operator_kernels *kernel_of(groom_operator_type type);
@@ -60,8 +70,8 @@ enum kernel_variant kernel_best_variant(void);
 #if defined(__x86_64__)
 #define KERNEL_TARGET_AVX2 __attribute__((target("avx2")))
 #define KERNEL_TABLE(name)                                                                                           \
-    static void name##_forward_baseline(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,   \
-                                        lanes *restrict scratch)                                                     \
+    static void name##_forward_baseline(const struct kernel_inputs *in, struct bundle x, struct bundle y,             \
+                                        lanes *scratch)                                                              \
     {                                                                                                                \
         name##_forward(in, x, y, scratch);                                                                           \
     }                                                                                                                \
@@ -70,8 +80,8 @@ enum kernel_variant kernel_best_variant(void);
     {                                                                                                                \
         name##_backward(in, x, d, adjoints, scratch);                                                                \
     }                                                                                                                \
-    KERNEL_TARGET_AVX2 static void name##_forward_avx2(const struct kernel_inputs *in, const lanes *restrict x,       \
-                                                       lanes *restrict y, lanes *restrict scratch)                   \
+    KERNEL_TARGET_AVX2 static void name##_forward_avx2(const struct kernel_inputs *in, struct bundle x,               \
+                                                       struct bundle y, lanes *scratch)                              \
     {                                                                                                                \
         name##_forward(in, x, y, scratch);                                                                           \
     }                                                                                                                \
@@ -85,8 +95,8 @@ enum kernel_variant kernel_best_variant(void);
                                                     {name##_backward_baseline, name##_backward_avx2}};
 #else
 #define KERNEL_TABLE(name)                                                                                           \
-    static void name##_forward_baseline(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,   \
-                                        lanes *restrict scratch)                                                     \
+    static void name##_forward_baseline(const struct kernel_inputs *in, struct bundle x, struct bundle y,             \
+                                        lanes *scratch)                                                              \
     {                                                                                                                \
         name##_forward(in, x, y, scratch);                                                                           \
     }                                                                                                                \

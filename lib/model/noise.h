@@ -79,21 +79,20 @@ LANES_INLINE float noise_epsilon_slope(float t, float *epsilon)
     return (2.0f / 3.0f) * slope;
 }
 
-/* --- cells looked up ------------------------------------------------------------------ */
+/* --- epsilon looked up ---------------------------------------------------------------- */
 
-/* The gradients of the first cells: a neighbouring pair costs one load in place of two hashes. That is
- * quicker by a third with WebAssembly's vectors of four, and slower by half with vectors of eight. */
-#ifdef __wasm_simd128__
-#define NOISE_LOOKED_UP 1
-#else
-#define NOISE_LOOKED_UP 0
-#endif
-#define NOISE_CELLS 1024
+/* Evaluations take epsilon from a table of cubics, which costs one load of four numbers where the two octaves
+ * cost four hashes: NOISE_PIECES to a cell, each through epsilon at both ends and at two places between, so that it
+ * is continuous; NOISE_TOLERANCE off at most (tested), as far as a float of chi tells. The offsets of the axes
+ * are whole numbers of pieces: one place among the pieces serves all three. Gradients take epsilon itself. */
+#define NOISE_PIECES 16
+#define NOISE_TOLERANCE 2e-5f
+#define NOISE_OFFSET_Y 597
+#define NOISE_OFFSET_Z 1147
+#define NOISE_NEAR 96 /* chi from 0 to below this is looked up, on all axes */
+#define NOISE_TABLE ((NOISE_NEAR + 72) * NOISE_PIECES)
 
-void noise_fill(float gradient[NOISE_CELLS + 1]);
-
-/* Whether all of t to t + NOISE_REACH, and twice that, lies in those cells. */
-#define NOISE_REACH 71.6875f
-LANES_INLINE int noise_is_near(float t) { return t >= 0.0f && 2.0f * (t + NOISE_REACH) < (float)NOISE_CELLS; }
+/* cubic [NOISE_TABLE]: epsilon(t) = c0 + f (c1 + f (c2 + f c3)) in piece floor(NOISE_PIECES t), f the fraction */
+void noise_fill(float (*cubic)[4]);
 
 #endif

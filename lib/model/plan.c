@@ -95,7 +95,7 @@ static groom_status make_relative(struct plan *plan, const uint32_t *strand, uin
 
 static groom_status fill_noise(struct plan *plan)
 {
-    plan->noise = memory_array(plan->allocator, NOISE_CELLS + 1, sizeof *plan->noise);
+    plan->noise = memory_array(plan->allocator, NOISE_TABLE, sizeof *plan->noise);
     if (!plan->noise)
         return GROOM_ENOMEM;
     noise_fill(plan->noise);
@@ -115,7 +115,7 @@ groom_status plan_init(struct plan *plan, const struct groom *groom, const uint3
         status = make_relative(plan, strand, first, count);
     if (status == GROOM_OK && (plan->bends || plan->curls))
         status = compute_frames(plan, strand, first, count, context);
-    if (status == GROOM_OK && plan->frizzes && NOISE_LOOKED_UP)
+    if (status == GROOM_OK && plan->frizzes)
         status = fill_noise(plan);
     if (status != GROOM_OK)
         plan_finish(plan);
@@ -132,7 +132,7 @@ void plan_finish(struct plan *plan)
                    sizeof *plan->relative);
     memory_release(plan->allocator, plan->frame, n * width, sizeof(float));
     memory_release(plan->allocator, plan->axis, n * AXIS_WIDTH, sizeof(float));
-    memory_release(plan->allocator, plan->noise, NOISE_CELLS + 1, sizeof *plan->noise);
+    memory_release(plan->allocator, plan->noise, NOISE_TABLE, sizeof *plan->noise);
     *plan = (struct plan){0};
 }
 
@@ -141,7 +141,7 @@ void plan_finish(struct plan *plan)
 groom_status workspace_init(struct workspace *w, uint32_t m, uint32_t n_states,
                             const struct groom_allocator *allocator)
 {
-    size_t points = (size_t)3 * m, n[6] = {points, n_states * points, points, (size_t)FRAME_WIDTH * m, AXIS_WIDTH,
+    size_t points = (size_t)3 * m, n[6] = {points, n_states * (points + m), points, (size_t)FRAME_WIDTH * m, AXIS_WIDTH,
                                            KERNEL_SCRATCH(m)};
     *w = (struct workspace){.m = m, .n_states = n_states};
     for (int i = 0; i < 6; i++)
@@ -226,6 +226,12 @@ static void load_base(const struct plan *plan, const struct block *block, struct
     block_from_rows(row, NULL, n, w->state);
 }
 
+struct bundle workspace_state(const struct workspace *w, uint32_t i)
+{
+    lanes *points = w->state + (size_t)4 * w->m * i;
+    return (struct bundle){.points = points, .at = points + (size_t)3 * w->m};
+}
+
 void plan_load(const struct plan *plan, const struct block *block, struct workspace *w)
 {
     if (plan->groom->base)
@@ -236,13 +242,15 @@ void plan_load(const struct plan *plan, const struct block *block, struct worksp
         for (int c = 0; c < 3; c++)
             w->root[c][l] = model_root(plan->groom, block->strand[l])[c];
     load_operator_guides(plan, block, w);
+    if (plan->n_active > 0)
+        kernel_measures[plan->variant](w->m, (const lanes *)w->state, workspace_state(w, 0).at);
 }
 
 struct kernel_inputs plan_inputs(const struct plan *plan, const struct block *block, const struct workspace *w,
                                  uint32_t a)
 {
     const struct groom_operator *op = &plan->groom->operators[plan->active[a]];
-    struct kernel_inputs in = {.m = w->m, .root = (const lanes *)w->root, .guide = w->guide, .frame = w->frame, .axis = w->axis, .noise = plan->noise};
+    struct kernel_inputs in = {.m = w->m, .root = (const lanes *)w->root, .guide = w->guide, .frame = w->frame, .axis = w->axis, .noise = (const float(*)[4])plan->noise};
     memcpy(in.parameter, op->parameter, sizeof in.parameter);
     for (uint32_t r = 0; r < groom_operator_random_arrays(op->type); r++)
         for (uint32_t l = 0; l < LANES; l++) {
@@ -253,10 +261,12 @@ struct kernel_inputs plan_inputs(const struct plan *plan, const struct block *bl
     return in;
 }
 
-void plan_apply(const struct plan *plan, const struct block *block, struct workspace *w, uint32_t a, const lanes *x,
-                lanes *y)
+void plan_apply(const struct plan *plan, const struct block *block, struct workspace *w, uint32_t a, struct bundle x,
+                struct bundle y)
 {
     struct kernel_inputs in = plan_inputs(plan, block, w, a);
     const struct groom_operator *op = &plan->groom->operators[plan->active[a]];
+    if (a + 1 == plan->n_active)
+        y.at = NULL;
     kernel_of(op->type)->forward[plan->variant](&in, x, y, w->scratch);
 }

@@ -16,7 +16,7 @@ struct plan {
     float *relative;        /* [n_g][3m] guides relative to their roots, where the groom has no base */
     float *frame;           /* [n_gop][FRAME_WIDTH * m] where it curls */
     float *axis;            /* [n_gop][AXIS_WIDTH] where it bends */
-    float *noise;           /* [NOISE_CELLS + 1] where it frizzes and NOISE_LOOKED_UP */
+    float (*noise)[4];      /* [NOISE_TABLE] where it frizzes */
     const struct groom_allocator *allocator;
 };
 
@@ -31,7 +31,7 @@ void plan_finish(struct plan *plan);
 struct workspace {
     uint32_t m, n_states;
     float *rows;              /* [LANES][3m]; where the groom has a base */
-    lanes *state;             /* [n_states][3m] the block before and after operators */
+    lanes *state;             /* [n_states][4m] the block before and after operators: workspace_state */
     lanes *guide;             /* [3m]; with frame and axis, as in kernel_inputs */
     lanes *frame;             /* [FRAME_WIDTH * m] */
     lanes *axis;              /* [AXIS_WIDTH] */
@@ -47,16 +47,19 @@ GROOM_MUST_CHECK groom_status workspace_init(struct workspace *workspace, uint32
                                              const struct groom_allocator *allocator);
 void workspace_finish(struct workspace *workspace, const struct groom_allocator *allocator); /* takes zeroes */
 
-/* Instance the block into state 0 and bring its operator guides into the lanes. */
+/* The points of state i, and room for their arc lengths. */
+struct bundle workspace_state(const struct workspace *workspace, uint32_t i);
+
+/* Instance the block into state 0, measure it and bring its operator guides into the lanes. */
 void plan_load(const struct plan *plan, const struct block *block, struct workspace *workspace);
 
 /* The kernels' view of the a-th active operator. */
 struct kernel_inputs plan_inputs(const struct plan *plan, const struct block *block,
                                  const struct workspace *workspace, uint32_t a);
 
-/* y = operator(x), the a-th active one. */
+/* y = operator(x), the a-th active one. The last one's are not measured. */
 void plan_apply(const struct plan *plan, const struct block *block, struct workspace *workspace, uint32_t a,
-                const lanes *x, lanes *y);
+                struct bundle x, struct bundle y);
 
 /* Roots of the strands in the lanes, for block_from_rows and block_to_rows. */
 void plan_roots(const struct plan *plan, const struct block *block, const float *root[LANES]);

@@ -20,16 +20,6 @@ LANES_INLINE quad quad_load(const float *from)
 
 LANES_INLINE void quad_store(float *to, quad q) { memcpy(to, &q, sizeof q); }
 
-/* Two floats from each of two places. */
-LANES_INLINE quad quad_of_pairs(const float *first, const float *second)
-{
-    typedef double doubles __attribute__((vector_size(16))); /* that carry two floats each */
-    double a, b;
-    memcpy(&a, first, sizeof a);
-    memcpy(&b, second, sizeof b);
-    return (quad)(doubles){a, b};
-}
-
 LANES_INLINE quad quad_of(float f) { return (quad){f, f, f, f}; }
 
 LANES_INLINE void quad_transpose(quad r[QUAD])

@@ -5,13 +5,19 @@
 
 enum { RANDOM_SCALE };
 
-LANES_INLINE void scale_forward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict y,
-                                lanes *restrict scratch)
+LANES_INLINE void scale_lines(uint32_t n, vec factor, const lanes *restrict x, lanes *restrict y)
+{
+    for (uint32_t i = 0; i < n; i++)
+        vec_store(y[i], factor * vec_load(x[i]));
+}
+
+LANES_INLINE void scale_forward(const struct kernel_inputs *in, struct bundle x, struct bundle y, lanes *scratch)
 {
     (void)scratch;
     vec factor = 1.0f + in->parameter[RANDOM_SCALE] * vec_load(in->random[0]);
-    for (uint32_t i = 0; i < 3 * in->m; i++)
-        vec_store(y[i], factor * vec_load(x[i]));
+    scale_lines(3 * in->m, factor, (const lanes *)x.points, y.points);
+    if (y.at)
+        scale_lines(in->m, vec_choose(factor < 0.0f, -factor, factor), (const lanes *)x.at, y.at);
 }
 
 LANES_INLINE void scale_backward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,

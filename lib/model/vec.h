@@ -80,19 +80,32 @@ LANES_INLINE vec vec_floor(vec t, ivec *whole)
 
 #endif
 
-/* table[index] and table[index + 1] of each lane: eight bytes a lane. */
-LANES_INLINE void vec_pairs(const float *restrict table, ivec index, vec *restrict low, vec *restrict high)
+/* Rows of four floats, one a lane, `skip` rows further: side by side, number k of each in c[k]. */
+#if LANES == QUAD
+LANES_INLINE void vec_fours(const float (*const row[LANES])[QUAD], uint32_t skip, vec c[QUAD])
 {
-    lanes even, odd;
-    for (int l = 0; l < LANES; l += QUAD) {
-        quad a = quad_of_pairs(table + index[l], table + index[l + 1]);
-        quad b = quad_of_pairs(table + index[l + 2], table + index[l + 3]);
-        quad_store(even + l, __builtin_shufflevector(a, b, 0, 2, 4, 6));
-        quad_store(odd + l, __builtin_shufflevector(a, b, 1, 3, 5, 7));
-    }
-    *low = vec_load(even);
-    *high = vec_load(odd);
+    c[0] = quad_load(row[0][skip]), c[1] = quad_load(row[1][skip]);
+    c[2] = quad_load(row[2][skip]), c[3] = quad_load(row[3][skip]);
+    quad_transpose(c);
 }
+#else
+LANES_INLINE vec vec_two(const float *first, const float *second)
+{
+    return __builtin_shufflevector(quad_load(first), quad_load(second), 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+LANES_INLINE void vec_fours(const float (*const row[LANES])[QUAD], uint32_t skip, vec c[QUAD])
+{
+    vec q = vec_two(row[0][skip], row[4][skip]), r = vec_two(row[1][skip], row[5][skip]);
+    vec s = vec_two(row[2][skip], row[6][skip]), t = vec_two(row[3][skip], row[7][skip]);
+    vec qr = __builtin_shufflevector(q, r, 0, 8, 1, 9, 4, 12, 5, 13), qr_high = __builtin_shufflevector(q, r, 2, 10, 3, 11, 6, 14, 7, 15);
+    vec st = __builtin_shufflevector(s, t, 0, 8, 1, 9, 4, 12, 5, 13), st_high = __builtin_shufflevector(s, t, 2, 10, 3, 11, 6, 14, 7, 15);
+    c[0] = __builtin_shufflevector(qr, st, 0, 1, 8, 9, 4, 5, 12, 13);
+    c[1] = __builtin_shufflevector(qr, st, 2, 3, 10, 11, 6, 7, 14, 15);
+    c[2] = __builtin_shufflevector(qr_high, st_high, 0, 1, 8, 9, 4, 5, 12, 13);
+    c[3] = __builtin_shufflevector(qr_high, st_high, 2, 3, 10, 11, 6, 7, 14, 15);
+}
+#endif
 
 /* --- the functions of model/lanes.h and model/noise.h ---------------------------------------- */
 
@@ -131,50 +144,38 @@ LANES_INLINE vec vec_noise_gradient(ivec stepped)
     return (vec)((ivec)size ^ (ivec)(h & 0x80000000u));
 }
 
-/* The gradients on either side of a cell: out of the table, or hashed where there is none. */
-LANES_INLINE void vec_gradients(const float *table, ivec cell, vec *low, vec *high)
-{
-    if (table) {
-        vec_pairs(table, cell, low, high);
-        return;
-    }
-    ivec stepped = (ivec)((uvec)cell * NOISE_STEP);
-    *low = vec_noise_gradient(stepped);
-    *high = vec_noise_gradient((ivec)((uvec)stepped + NOISE_STEP));
-}
-
-LANES_INLINE vec vec_noise(const float *table, vec t)
+LANES_INLINE vec vec_noise(vec t)
 {
     ivec cell;
-    vec f = t - vec_floor(t, &cell), low, high;
-    vec_gradients(table, cell, &low, &high);
-    vec a = low * f, b = high * (f - 1.0f);
+    vec f = t - vec_floor(t, &cell);
+    ivec stepped = (ivec)((uvec)cell * NOISE_STEP);
+    vec a = vec_noise_gradient(stepped) * f, b = vec_noise_gradient((ivec)((uvec)stepped + NOISE_STEP)) * (f - 1.0f);
     return a + NOISE_FADE(f) * (b - a);
 }
 
-/* table: noise_fill's, where all cells of t and 2 t are in it; or NULL */
-LANES_INLINE vec vec_epsilon(const float *table, vec t)
+LANES_INLINE vec vec_epsilon(vec t)
 {
-    vec coarse = vec_noise(table, t), fine = vec_noise(table, 2.0f * t);
+    vec coarse = vec_noise(t), fine = vec_noise(2.0f * t);
     return NOISE_OCTAVES(coarse, fine);
 }
 
 /* --- arc length --------------------------------------------------------------------------------- */
 
-/* at[j], j < m: arc length from the root to vertex j; arc_measure's, without the segments.
- * returns  1 / length of the strand, 0 where it has none */
-LANES_INLINE vec vec_arc(uint32_t m, const lanes *restrict x, lanes *restrict at)
+/* Arc length up to the last vertex that it was given. */
+struct measure {
+    vec x, y, z, length;
+};
+
+LANES_INLINE struct measure measure_from(const lanes *root)
 {
-    vec px = vec_load(x[0]), py = vec_load(x[1]), pz = vec_load(x[2]), sum = {0};
-    vec_store(at[0], sum);
-    for (uint32_t j = 1; j < m; j++) {
-        vec qx = vec_load(x[3 * j]), qy = vec_load(x[3 * j + 1]), qz = vec_load(x[3 * j + 2]);
-        vec ex = qx - px, ey = qy - py, ez = qz - pz;
-        sum += vec_sqrt(ex * ex + ey * ey + ez * ez);
-        vec_store(at[j], sum);
-        px = qx, py = qy, pz = qz;
-    }
-    return vec_inverse(sum);
+    return (struct measure){.x = vec_load(root[0]), .y = vec_load(root[1]), .z = vec_load(root[2])};
+}
+
+LANES_INLINE void measure_to(struct measure *measure, vec x, vec y, vec z)
+{
+    vec ex = x - measure->x, ey = y - measure->y, ez = z - measure->z;
+    measure->length += vec_sqrt(ex * ex + ey * ey + ez * ez);
+    measure->x = x, measure->y = y, measure->z = z;
 }
 
 LANES_INLINE void vec_copy_root(const lanes *restrict x, lanes *restrict y)

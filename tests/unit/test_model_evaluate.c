@@ -51,6 +51,19 @@ START_TEST(each_operator_follows_its_formula)
 }
 END_TEST
 
+/* Strands that run out of the noise that is looked up, and such as lie beyond it. */
+START_TEST(frizz_follows_its_formula_beyond_the_table)
+{
+    struct groom *groom = test_groom(middling, 5);
+    test_append_operator(groom, GROOM_OPERATOR_FRIZZ, 11);
+    for (float frequency = 300.0f; frequency < 6000.0f; frequency *= 4.0f) {
+        groom->operators[0].parameter[0] = frequency;
+        ck_assert_double_lt(worst_error(groom), 6e-7);
+    }
+    groom_destroy(groom);
+}
+END_TEST
+
 START_TEST(instancing_follows_equation_3)
 {
     for (uint32_t k = 1; k <= 7; k += 3)
@@ -202,7 +215,7 @@ START_TEST(evaluation_survives_every_failed_allocation)
 }
 END_TEST
 
-TEST_SUITE("model_evaluate", each_operator_follows_its_formula, instancing_follows_equation_3,
+TEST_SUITE("model_evaluate", each_operator_follows_its_formula, frizz_follows_its_formula_beyond_the_table, instancing_follows_equation_3,
            chains_of_any_order_and_length_follow_the_formulas, a_disabled_operator_does_nothing,
            degenerate_guides_follow_the_formulas_and_stay_finite, extreme_parameters_stay_finite,
            any_range_gives_the_same_bits, any_pool_and_any_instruction_set_give_the_same_bits,
