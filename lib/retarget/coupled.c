@@ -1,4 +1,5 @@
-/* Strands adapted together: guides in the coarse scale, all of them in the global mode (Section 4.6). */
+/* Strands adapted together as Section 4.6 has it: in each iteration the quadratic programme of held lengths, to its
+ * exact solution; and Eq. 1's energies. */
 #include "retarget/coupled.h"
 
 #include <math.h>
@@ -11,8 +12,7 @@
 #define ROUNDS 30            /* of the active set */
 #define ROUNDS_RELEASING 12  /* after these nothing is let go any more */
 #define MOST_STEPS 400       /* of conjugate gradients */
-#define EXACT 1e-7           /* share of its start that an error may keep, where no tolerance is given */
-#define NEAR 1e-3            /* ... and where one is */
+#define EXACT 1e-7           /* share of its start that an error may keep */
 #define SLACK 1e-9           /* metres by which a half-space may be missed */
 
 /* --- contacts ------------------------------------------------------------------------------- */
@@ -126,13 +126,13 @@ static void move_piece(void *user, uint32_t piece, uint32_t thread)
 static double iterate(struct system *s, uint32_t *n_changed)
 {
     const struct groom_context *context = s->job->context;
-    double share = s->job->options->tolerance > 0 ? NEAR : EXACT, scale = 0, sum = 0;
+    double scale = 0, sum = 0;
     struct round round = {.s = s, .n_changed = n_changed};
     system_linearise(s);
     parallel_for(context, s->n_pieces, renew_piece, s);
     for (int i = 0; i < ROUNDS; i++) {
         uint32_t n = 0;
-        scale = system_solve(s, scale, share, MOST_STEPS);
+        scale = system_solve(s, scale, EXACT, MOST_STEPS);
         system_apply(s, s->x, s->ad);
         round.releasing = i < ROUNDS_RELEASING;
         parallel_for(context, s->n_pieces, contacts_piece, &round);
@@ -223,12 +223,14 @@ static void measure_piece(void *user, uint32_t piece, uint32_t thread)
     const struct measuring *m = user;
     struct groom_retarget_energy energy = {0};
     (void)thread;
-    for (uint32_t strand = piece * COUPLED_PIECE; strand < m->hair->n_strands && strand < (piece + 1) * COUPLED_PIECE; strand++)
+    for (uint32_t o = piece * COUPLED_PIECE; o < m->hair->n_strands && o < (piece + 1) * COUPLED_PIECE; o++) {
+        uint32_t strand = m->hair->order[o];
         for (uint32_t i = m->hair->first[strand]; i < m->hair->first[strand + 1]; i++) {
             if (i + 1 < m->hair->first[strand + 1])
                 measure_shape(m, i, &energy);
             measure_others(m, i, &energy);
         }
+    }
     m->energies[piece] = energy;
 }
 

@@ -2,20 +2,17 @@
 #ifndef RETARGET_COUPLED_H
 #define RETARGET_COUPLED_H
 
-#include "retarget/job.h"
+#include "retarget/links.h"
 
 enum coupled_state { COUPLED_FREE, COUPLED_KNOWN, COUPLED_ACTIVE, COUPLED_FIXED };
 
-/* The matrix A of Eq. 1 with the lengths of segments held: shape's tridiagonal, alpha L^T G L, beta G, where
- * G = diag(gamma). x, y and z do not meet in it. Unknown is the movement x; A x = b where no half-space holds. */
+/* The matrix A of Eq. 1 with the lengths of segments held: shape's tridiagonal and K of links.h. Unknown is the movement x; A x = b where no half-space holds. */
 struct system {
     struct job *job;
     const struct coupled *hair;
     uint32_t n_pieces;
-    uint32_t *back_first, *back_row;  /* the graph the other way round: who has i for a neighbour ... */
-    float *back_weight;               /* ... and with which weight */
+    struct links links;
     float *w;                         /* [n] of the segment from i to i + 1: 1 / length^2; 0 at tips */
-    float *diagonal;                  /* [n] of alpha L^T G L + beta G */
     float *pivot;                     /* [n] of the tridiagonal preconditioner */
     float (*b)[3], (*x)[3], (*r)[3], (*d)[3], (*ad)[3], (*f)[3]; /* [n] */
     float *away;                      /* [n] the surface is so far from p at least */

@@ -12,45 +12,11 @@
 
 /* --- memory ------------------------------------------------------------------------------ */
 
-static void count_back(struct system *s)
-{
-    const struct graph *graph = s->hair->graph;
-    size_t n_links = (size_t)s->hair->n * graph->k;
-    memset(s->back_first, 0, ((size_t)s->hair->n + 1) * sizeof *s->back_first);
-    for (size_t l = 0; l < n_links; l++)
-        s->back_first[graph->neighbour[l] + 1] += graph->weight[l] > 0;
-    for (uint32_t i = 0; i < s->hair->n; i++)
-        s->back_first[i + 1] += s->back_first[i];
-}
-
-/* Fills rows from their ends down, so that first[i] is right once all are in. */
-static void fill_back(struct system *s)
-{
-    const struct graph *graph = s->hair->graph;
-    for (uint32_t i = 0; i < s->hair->n; i++)
-        s->back_first[i] = s->back_first[i + 1];
-    for (uint32_t row = s->hair->n; row-- > 0;)
-        for (uint32_t j = graph->k; j-- > 0;) {
-            size_t l = (size_t)row * graph->k + j;
-            if (graph->weight[l] > 0) {
-                uint32_t at = --s->back_first[graph->neighbour[l]];
-                s->back_row[at] = row;
-                s->back_weight[at] = graph->weight[l];
-            }
-        }
-}
-
-static size_t n_links(const struct coupled *hair) { return (size_t)hair->n * hair->graph->k; }
-
 static int system_allocate(struct system *s, const struct groom_allocator *allocator)
 {
     const struct coupled *hair = s->hair;
     uint32_t n = hair->n;
-    s->back_first = memory_array(allocator, (size_t)n + 1, sizeof *s->back_first);
-    s->back_row = memory_array(allocator, n_links(hair), sizeof *s->back_row);
-    s->back_weight = memory_array(allocator, n_links(hair), sizeof *s->back_weight);
     s->w = memory_array(allocator, n, sizeof *s->w);
-    s->diagonal = memory_array(allocator, n, sizeof *s->diagonal);
     s->pivot = memory_array(allocator, n, sizeof *s->pivot);
     s->b = memory_array(allocator, n, sizeof *s->b);
     s->x = memory_array(allocator, n, sizeof *s->x);
@@ -62,7 +28,7 @@ static int system_allocate(struct system *s, const struct groom_allocator *alloc
     s->state = memory_array_zero(allocator, n, 1);
     s->plane = memory_array(allocator, n, sizeof *s->plane);
     s->sums = memory_array(allocator, s->n_pieces, sizeof *s->sums);
-    return s->back_first && s->back_row && s->back_weight && s->w && s->diagonal && s->pivot && s->b && s->x && s->r &&
+    return s->w && s->pivot && s->b && s->x && s->r &&
            s->d && s->ad && s->f && s->away && s->state && s->plane && s->sums;
 }
 
@@ -70,11 +36,8 @@ void system_finish(struct system *s)
 {
     const struct groom_allocator *allocator = s->job->allocator;
     uint32_t n = s->hair->n;
-    memory_release(allocator, s->back_first, (size_t)n + 1, sizeof *s->back_first);
-    memory_release(allocator, s->back_row, n_links(s->hair), sizeof *s->back_row);
-    memory_release(allocator, s->back_weight, n_links(s->hair), sizeof *s->back_weight);
+    links_finish(&s->links, allocator);
     memory_release(allocator, s->w, n, sizeof *s->w);
-    memory_release(allocator, s->diagonal, n, sizeof *s->diagonal);
     memory_release(allocator, s->pivot, n, sizeof *s->pivot);
     memory_release(allocator, s->b, n, sizeof *s->b);
     memory_release(allocator, s->x, n, sizeof *s->x);
@@ -88,28 +51,14 @@ void system_finish(struct system *s)
     memory_release(allocator, s->sums, s->n_pieces, sizeof *s->sums);
 }
 
-static float gamma_of(const struct coupled *hair, uint32_t i) { return hair->gamma ? hair->gamma[i] : 1; }
-static int has_neighbours(const struct coupled *hair, uint32_t i) { return hair->graph->weight[(size_t)i * hair->graph->k] > 0; }
-
-static void set_diagonal(struct system *s)
-{
-    const struct groom_retarget_options *options = s->job->options;
-    for (uint32_t i = 0; i < s->hair->n; i++) {
-        double own = has_neighbours(s->hair, i) ? gamma_of(s->hair, i) : 0;
-        for (uint32_t l = s->back_first[i]; l < s->back_first[i + 1]; l++)
-            own += gamma_of(s->hair, s->back_row[l]) * (double)s->back_weight[l] * s->back_weight[l];
-        s->diagonal[i] = (float)(options->alpha * own + options->beta * gamma_of(s->hair, i));
-    }
-}
-
 groom_status system_init(struct system *s, struct job *job, const struct coupled *hair, struct groom_diag *diag)
 {
     *s = (struct system){.job = job, .hair = hair, .n_pieces = hair->n_strands / COUPLED_PIECE + 1};
+    groom_status st = links_init(&s->links, job, hair, diag);
+    if (st != GROOM_OK)
+        return st;
     if (!system_allocate(s, job->allocator))
         return groom_fail(diag, GROOM_ENOMEM, "no memory to adapt %u particles together", hair->n);
-    count_back(s);
-    fill_back(s);
-    set_diagonal(s);
     for (uint32_t i = 0; i < hair->n_strands; i++)
         s->state[hair->first[i]] = COUPLED_FIXED;
     return GROOM_OK;
@@ -121,7 +70,6 @@ struct product {
     struct system *s;
     const float (*v)[3];
     float (*out)[3];
-    int of_movement; /* f of p - rest in place of v */
 };
 
 /* f = G L v */
@@ -129,32 +77,16 @@ static void laplacian_piece(void *user, uint32_t piece, uint32_t thread)
 {
     const struct product *job = user;
     const struct coupled *hair = job->s->hair;
-    const struct graph *graph = hair->graph;
-    uint32_t k = graph->k, end = hair->first[system_piece_end(job->s, piece)];
+    uint32_t end = hair->first[system_piece_end(job->s, piece)];
     (void)thread;
-    for (uint32_t i = hair->first[piece * COUPLED_PIECE]; i < end; i++) {
-        const uint32_t *neighbour = graph->neighbour + (size_t)i * k;
-        const float *weight = graph->weight + (size_t)i * k;
-        float *f = job->s->f[i], own = weight[0] > 0, gamma = gamma_of(hair, i);
-        float sum[3] = {own * job->v[i][0], own * job->v[i][1], own * job->v[i][2]};
-        for (uint32_t j = 0; j < k; j++)
-            for (int c = 0; c < 3; c++)
-                sum[c] -= weight[j] * job->v[neighbour[j]][c];
-        for (int c = 0; c < 3; c++)
-            f[c] = gamma * sum[c];
-    }
+    for (uint32_t i = hair->first[piece * COUPLED_PIECE]; i < end; i++)
+        point_store(job->s->f[i], links_difference(&job->s->links, i, job->v));
 }
 
 /* alpha L^T f of one particle */
 static void pulled(const struct system *s, uint32_t i, float out[3])
 {
-    float own = has_neighbours(s->hair, i), alpha = (float)s->job->options->alpha;
-    float sum[3] = {own * s->f[i][0], own * s->f[i][1], own * s->f[i][2]};
-    for (uint32_t l = s->back_first[i]; l < s->back_first[i + 1]; l++)
-        for (int c = 0; c < 3; c++)
-            sum[c] -= s->back_weight[l] * s->f[s->back_row[l]][c];
-    for (int c = 0; c < 3; c++)
-        out[c] = alpha * sum[c];
+    point_store(out, links_pull(&s->links, i, (const float(*)[3])s->f));
 }
 
 /* out = A v, and the piece's part of v . out */
@@ -163,13 +95,13 @@ static void apply_piece(void *user, uint32_t piece, uint32_t thread)
     const struct product *job = user;
     struct system *s = job->s;
     const struct coupled *hair = s->hair;
-    float beta = (float)s->job->options->beta;
+    float beta = s->links.beta;
     double sum = 0;
     (void)thread;
     for (uint32_t strand = piece * COUPLED_PIECE; strand < system_piece_end(s, piece); strand++) {
         uint32_t first = hair->first[strand], last = hair->first[strand + 1] - 1;
         for (uint32_t i = first; i <= last; i++) {
-            float *out = job->out[i], gamma = beta * gamma_of(hair, i);
+            float *out = job->out[i], gamma = beta * links_gamma(&s->links, i);
             pulled(s, i, out);
             for (int c = 0; c < 3; c++) {
                 float v = job->v[i][c], before = i > first ? s->w[i - 1] * (v - job->v[i - 1][c]) : 0;
@@ -228,9 +160,9 @@ static void movement_piece(void *user, uint32_t piece, uint32_t thread)
 static void force_strand(struct system *s, uint32_t first, uint32_t last)
 {
     const struct coupled *hair = s->hair;
-    float before[3] = {0, 0, 0}, beta = (float)s->job->options->beta;
+    float before[3] = {0, 0, 0}, beta = s->links.beta;
     for (uint32_t i = first; i <= last; i++) {
-        float after[3] = {0, 0, 0}, pull[3], step[3], rest[3], gamma = beta * gamma_of(hair, i);
+        float after[3] = {0, 0, 0}, pull[3], step[3], rest[3], gamma = beta * links_gamma(&s->links, i);
         s->w[i] = 0;
         if (i < last) {
             float length = segment((const float(*)[3])hair->p, i, step), was = segment(hair->rest, i, rest);
@@ -252,7 +184,7 @@ static void factor_strand(struct system *s, uint32_t first, uint32_t last)
 {
     for (uint32_t i = first + 1; i <= last; i++) {
         float back = i > first + 1 ? s->w[i - 1] * s->w[i - 1] * s->pivot[i - 1] : 0;
-        s->pivot[i] = 1 / (s->diagonal[i] + s->w[i - 1] + s->w[i] - back);
+        s->pivot[i] = 1 / (s->links.diagonal[i] + s->w[i - 1] + s->w[i] - back);
     }
     s->pivot[first] = 0;
 }

@@ -9,7 +9,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/progress.h"
-#include "retarget/strand.h"
+#include "retarget/descent.h"
 
 #define PIECE 64             /* strands */
 #define BATCH 32             /* pieces between two looks at progress */
@@ -29,6 +29,8 @@ struct fine_space {
     double *gamma;
     double (*p)[3];
     double *away;            /* the surface is so far from p at least */
+    struct coupled one;      /* the strand as descent.h has it */
+    struct descent descent;
 };
 
 struct fine {
@@ -216,6 +218,26 @@ static double move(const struct fine_space *s)
     return sum / s->strand.n;
 }
 
+/* The same without held lengths, in floats. */
+static uint32_t descend(const struct job *job, struct fine_space *s)
+{
+    const struct groom_retarget_options *options = job->options;
+    float(*rest)[3] = (float(*)[3])s->one.rest;
+    for (uint32_t i = 0; i < s->strand.n; i++) {
+        to_floats(s->rest[i], rest[i]);
+        to_floats(s->p[i], s->one.p[i]);
+        s->descent.links.diagonal[i] = (float)((options->alpha + options->beta) * s->gamma[i]);
+        for (int c = 0; c < 3; c++)
+            s->descent.q[i][c] = (float)-(s->gamma[i] * (options->alpha * (s->p[i][c] - s->aim[i][c]) +
+                                                         options->beta * (s->p[i][c] - s->hat[i][c])));
+    }
+    uint32_t iterations = descent_strand_solve(&s->descent, s->strand.n);
+    for (uint32_t i = 0; i < s->strand.n; i++)
+        for (int c = 0; c < 3; c++)
+            s->p[i][c] = s->one.p[i][c];
+    return iterations;
+}
+
 /* returns how many iterations it took */
 static uint32_t adapt(const struct job *job, const struct fine_space *s)
 {
@@ -272,7 +294,7 @@ static void fine_piece(void *user, uint32_t index, uint32_t thread)
             continue;
         load(fine, s, i);
         if (fine->result) {
-            uint32_t n = adapt(fine->job, s);
+            uint32_t n = fine->job->options->tolerance > 0 ? descend(fine->job, s) : adapt(fine->job, s);
             fine->iterations[piece] = n > fine->iterations[piece] ? n : fine->iterations[piece];
             for (uint32_t j = 0; j < s->strand.n; j++)
                 to_floats(s->p[j], fine->result[first + j]);
@@ -287,6 +309,7 @@ static void fine_piece(void *user, uint32_t index, uint32_t thread)
 
 static void space_finish(struct fine_space *s, uint32_t longest, const struct groom_allocator *allocator)
 {
+    descent_strand_finish(&s->descent, &s->one, longest);
     strand_finish(&s->strand, longest, allocator);
     memory_release(allocator, s->rest, longest, sizeof *s->rest);
     memory_release(allocator, s->hat, longest, sizeof *s->hat);
@@ -298,9 +321,10 @@ static void space_finish(struct fine_space *s, uint32_t longest, const struct gr
     memory_release(allocator, s->away, longest, sizeof *s->away);
 }
 
-static int space_init(struct fine_space *s, uint32_t longest, const struct groom_allocator *allocator)
+static int space_init(struct fine_space *s, struct job *job, uint32_t longest)
 {
-    int ready = strand_init(&s->strand, longest, allocator);
+    const struct groom_allocator *allocator = job->allocator;
+    int ready = strand_init(&s->strand, longest, allocator) && descent_strand_init(&s->descent, &s->one, job, longest);
     s->rest = memory_array(allocator, longest, sizeof *s->rest);
     s->hat = memory_array(allocator, longest, sizeof *s->hat);
     s->aim = memory_array(allocator, longest, sizeof *s->aim);
@@ -337,7 +361,7 @@ static groom_status fine_run(struct fine *fine, struct groom_retarget_energy *en
     fine->iterations = memory_array_zero(job->allocator, n_pieces, sizeof *fine->iterations);
     int ready = fine->spaces && fine->energies && fine->iterations;
     for (uint32_t i = 0; ready && i < n_threads; i++)
-        ready = space_init(&fine->spaces[i], longest, job->allocator);
+        ready = space_init(&fine->spaces[i], job, longest);
     st = ready ? run_batches(fine, n_pieces, diag) : groom_fail(diag, GROOM_ENOMEM, "no memory to adapt strands");
     *energy = (struct groom_retarget_energy){0};
     for (uint32_t i = 0; ready && i < n_pieces; i++) {

@@ -54,12 +54,13 @@ groom_status fine_solve(struct job *job, const float (*guide_moved)[3], float (*
 groom_status fine_energy(struct job *job, const float (*guide_moved)[3], const float (*at)[3],
                          struct groom_retarget_energy *energy, struct groom_diag *diag);
 
-/* --- the coarse scale and the global mode (coupled.c): Section 4.6 -------------------- */
+/* --- the coarse scale and the global mode: strands that pull on each other ------------- */
 
 /* Strands that are adapted together. */
 struct coupled {
     uint32_t n_strands, n;
     const uint32_t *first;       /* [n_strands + 1] */
+    const uint32_t *order;       /* [n_strands] those that grow near each other are near in it */
     const float (*rest)[3];      /* [n] p-bar relative to the source's centre */
     const float (*hat)[3];       /* [n] p-hat */
     const float *gamma;          /* [n] Eq. 20, or NULL: 1 */
@@ -67,7 +68,15 @@ struct coupled {
     float (*p)[3];               /* [n] in: where they start; out: adapted */
 };
 
+/* order of hair's first and rest (order.c) */
+groom_status coupled_order(const struct coupled *hair, uint32_t *order, const struct groom_allocator *allocator,
+                           struct groom_diag *diag);
+/* Section 4.6 to the letter (coupled.c): so many iterations, each with the lengths of segments held, to the last
+ * digits. What a reference is compared with. */
 groom_status coupled_solve(struct job *job, const struct coupled *hair, uint32_t iterations, uint32_t *n_iterations,
+                           struct groom_retarget_step *history, struct groom_diag *diag);
+/* Down to where a step moves less than the tolerance, lengths as they are (descent.c). An iteration is a step. */
+groom_status descent_solve(struct job *job, const struct coupled *hair, uint32_t iterations, uint32_t *n_iterations,
                            struct groom_retarget_step *history, struct groom_diag *diag);
 groom_status coupled_energy(struct job *job, const struct coupled *hair, const float (*at)[3],
                             struct groom_retarget_energy *energy, struct groom_diag *diag);

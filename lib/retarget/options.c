@@ -32,9 +32,9 @@ static const struct option_row rows[] = {
     {"sigma_bone", OPTION_REAL, AT(sigma_bone), 100, 0, 500, "How much a bone is preferred that a particle stands square to (Eq. 2)."},
     {"sigma_root", OPTION_REAL, AT(sigma_root), 0.2, 1e-6, 1e3, "How soon along a strand its place counts again after its root was moved (Eq. 20)."},
     {"guides", OPTION_U32, AT(guides), 300, 1, 100000, "Strands that are adapted together first; the others follow between them (Section 5)."},
-    {"iterations", OPTION_U32, AT(iterations), 15, 1, 1000, "Iterations in each scale at most (Section 4.6)."},
-    {"tolerance", OPTION_REAL, AT(tolerance), 1e-5, 0, 1, "Mean movement in an iteration, metres, that ends them. 0: all iterations, each to the last digits."},
-    {"sweeps", OPTION_U32, AT(sweeps), 0, 0, 1000, "Iterations over the whole hairstyle after the fine scale, past the paper; 0: none."},
+    {"iterations", OPTION_U32, AT(iterations), 15, 1, 1000, "Iterations in each scale at most: steps down Eq. 1, or, where tolerance is 0, the quadratic programmes of Section 4.6."},
+    {"tolerance", OPTION_REAL, AT(tolerance), 1e-5, 0, 1, "Mean movement in an iteration, metres, that ends them. 0: all iterations, as Section 4.6 has them, each to the last digits."},
+    {"sweeps", OPTION_U32, AT(sweeps), 0, 0, 1000, "Iterations over the whole hairstyle after the fine scale, past the paper: ten come near the global mode; 0: none."},
     {"mode", OPTION_MODE, AT(mode), GROOM_RETARGET_MULTISCALE, 0, 1, "multiscale: guides together, then every strand between them. global: all strands together, for comparison."},
     {"seed", OPTION_U64, AT(seed), 1, 0, 999999999999999.0, "Seed of the clustering that chooses guides."},
 };

@@ -115,7 +115,7 @@ void job_finish(struct job *job)
 /* Copies of some strands, one after the other. */
 struct gathered {
     struct coupled hair;
-    uint32_t *first;
+    uint32_t *first, *order;
     float (*rest)[3], (*hat)[3], *gamma;
 };
 
@@ -123,6 +123,7 @@ static void gathered_finish(struct gathered *g, const struct groom_allocator *al
 {
     uint32_t n = g->hair.n;
     memory_release(allocator, g->first, (size_t)g->hair.n_strands + 1, sizeof *g->first);
+    memory_release(allocator, g->order, g->hair.n_strands, sizeof *g->order);
     memory_release(allocator, g->rest, n, sizeof *g->rest);
     memory_release(allocator, g->hat, n, sizeof *g->hat);
     memory_release(allocator, g->gamma, n, sizeof *g->gamma);
@@ -165,11 +166,12 @@ static groom_status gather(const struct job *job, const uint32_t *which, uint32_
     }
     g->hair = (struct coupled){.n_strands = n_strands, .n = n, .graph = graph};
     g->first = memory_array(job->allocator, (size_t)n_strands + 1, sizeof *g->first);
+    g->order = memory_array(job->allocator, n_strands, sizeof *g->order);
     g->rest = memory_array(job->allocator, n, sizeof *g->rest);
     g->hat = memory_array(job->allocator, n, sizeof *g->hat);
     g->gamma = job->shift ? memory_array(job->allocator, n, sizeof *g->gamma) : NULL;
     g->hair.p = memory_array(job->allocator, n, sizeof *g->hair.p);
-    if (!g->first || !g->rest || !g->hat || (job->shift && !g->gamma) || !g->hair.p)
+    if (!g->first || !g->order || !g->rest || !g->hat || (job->shift && !g->gamma) || !g->hair.p)
         return groom_fail(diag, GROOM_ENOMEM, "no memory to adapt %u particles together", n);
     g->first[0] = 0;
     for (uint32_t i = 0; i < n_strands; i++) {
@@ -178,10 +180,11 @@ static groom_status gather(const struct job *job, const uint32_t *which, uint32_
         gather_strand(job, g, i, strand);
     }
     g->hair.first = g->first;
+    g->hair.order = g->order;
     g->hair.rest = (const float(*)[3])g->rest;
     g->hair.hat = (const float(*)[3])g->hat;
     g->hair.gamma = g->gamma;
-    return GROOM_OK;
+    return coupled_order(&g->hair, g->order, job->allocator, diag);
 }
 
 static void scatter(const struct job *job, const uint32_t *which, const struct coupled *hair, float (*result)[3])
@@ -202,6 +205,14 @@ static void add(struct groom_retarget_energy *sum, const struct groom_retarget_e
 
 /* --- the two modes ---------------------------------------------------------------------------------------- */
 
+/* Where no tolerance is given, the paper's own iterations are wanted. */
+static groom_status solve(struct job *job, const struct coupled *hair, uint32_t iterations, uint32_t *n_iterations,
+                          struct groom_retarget_step *history, struct groom_diag *diag)
+{
+    return job->options->tolerance > 0 ? descent_solve(job, hair, iterations, n_iterations, history, diag)
+                                       : coupled_solve(job, hair, iterations, n_iterations, history, diag);
+}
+
 static groom_status adapt_together(struct job *job, const uint32_t *which, uint32_t n_strands, const struct graph *graph,
                                    float (*result)[3], struct gathered *g, struct groom_diag *diag)
 {
@@ -210,7 +221,7 @@ static groom_status adapt_together(struct job *job, const uint32_t *which, uint3
     if (st == GROOM_OK)
         st = coupled_energy(job, &g->hair, g->hair.hat, &report->before, diag);
     if (st == GROOM_OK)
-        st = coupled_solve(job, &g->hair, job->options->iterations, &report->iterations_coarse, report->coarse, diag);
+        st = solve(job, &g->hair, job->options->iterations, &report->iterations_coarse, report->coarse, diag);
     if (st == GROOM_OK)
         st = coupled_energy(job, &g->hair, (const float(*)[3])g->hair.p, &report->after, diag);
     if (st == GROOM_OK)
@@ -256,7 +267,7 @@ static groom_status adapt_whole(struct job *job, float (*result)[3], struct groo
     if (st == GROOM_OK)
         st = coupled_energy(job, &g.hair, (const float(*)[3])g.hair.p, &report->two_scales, diag);
     if (st == GROOM_OK)
-        st = coupled_solve(job, &g.hair, job->options->sweeps, &report->iterations_whole, NULL, diag);
+        st = solve(job, &g.hair, job->options->sweeps, &report->iterations_whole, NULL, diag);
     if (st == GROOM_OK)
         st = coupled_energy(job, &g.hair, (const float(*)[3])g.hair.p, &report->after, diag);
     if (st == GROOM_OK)

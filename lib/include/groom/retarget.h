@@ -45,8 +45,9 @@ struct groom_retarget_options {
     double sigma_bone;   /* of Eq. 2 */
     double sigma_root;   /* of Eq. 20 */
     uint32_t guides;     /* strands of the coarse scale; all where there are no more */
-    uint32_t iterations; /* of Section 4.6, in each scale, at most */
-    double tolerance;    /* mean movement that ends them, metres; 0: all iterations, each solved to the last digits */
+    uint32_t iterations; /* in each scale, at most: steps of conjugate gradients down Eq. 1, or those of Section 4.6 */
+    double tolerance;    /* mean movement that ends them, metres; 0: those of Section 4.6, all of them, each solved to the
+                            last digits: what a reference is compared with */
     uint32_t sweeps;     /* rounds over the whole hairstyle after the fine scale: every particle between its own
                             neighbours, not the guides'; 0: none, as in the paper */
     groom_retarget_mode mode;
@@ -126,7 +127,7 @@ struct groom_retarget_energy {
 
 #define GROOM_RETARGET_MAX_HISTORY 64
 
-/* One iteration of Section 4.6. */
+/* One iteration. */
 struct groom_retarget_step {
     struct groom_retarget_energy energy; /* after it */
     double mean_movement;                /* metres */
