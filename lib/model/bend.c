@@ -11,6 +11,7 @@
 enum { ANGLE, START };
 
 #define TURNS_IN_RADIAN 0.159154943f
+#define HALVES_IN_RADIAN (2.0f * TURNS_IN_RADIAN)
 #define PI 3.14159265f
 
 /* What forward and backward both need. */
@@ -55,12 +56,13 @@ LANES_INLINE void bend_measure(const struct kernel_inputs *in, const lanes *rest
 LANES_INLINE vec bend_sums(const struct kernel_inputs *in, const lanes *restrict at, lanes *restrict at_y,
                            lanes *restrict bent)
 {
-    vec inverse = vec_inverse(vec_load(at[in->m - 1])), sum = {0}, before = {0};
+    struct beginning beginning = beginning_of(in->parameter[START], vec_inverse(vec_load(at[in->m - 1])));
+    vec sum = {0}, before = {0};
     if (at_y)
         vec_store(at_y[0], before);
     for (uint32_t j = 1; j < in->m; j++) {
         vec s = vec_load(at[j]);
-        sum += (s - before) * vec_begun(s * inverse, in->parameter[START]);
+        sum += (s - before) * vec_begun(&beginning, s);
         vec_store(bent[j], sum);
         if (at_y)
             vec_store(at_y[j], s);
@@ -69,16 +71,29 @@ LANES_INLINE vec bend_sums(const struct kernel_inputs *in, const lanes *restrict
     return vec_inverse(sum);
 }
 
-/* x~ from the angles rate * bent. */
-LANES_INLINE void bend_turn(uint32_t m, const vec a[3], vec rate, const lanes *restrict bent, const lanes *restrict x,
-                            lanes *restrict y)
+/* Sine and cosine of each segment's angle. near: none is more than a quarter of a turn */
+LANES_INLINE void bend_angles(uint32_t m, int near, vec rate, const lanes *restrict bent, lanes *restrict sine,
+                              lanes *restrict cosine)
 {
-    vec px = vec_load(x[0]), py = vec_load(x[1]), pz = vec_load(x[2]), rx = px, ry = py, rz = pz, s, c;
+    vec s, c;
+    for (uint32_t j = 1; j < m; j++) {
+        if (near)
+            vec_sincos_near(rate * vec_load(bent[j]), &s, &c);
+        else
+            vec_sincos_halves(rate * vec_load(bent[j]), &s, &c);
+        vec_store(sine[j], s);
+        vec_store(cosine[j], c);
+    }
+}
+
+LANES_INLINE void bend_turn(uint32_t m, const vec a[3], const lanes *restrict sine, const lanes *restrict cosine,
+                            const lanes *restrict x, lanes *restrict y)
+{
+    vec px = vec_load(x[0]), py = vec_load(x[1]), pz = vec_load(x[2]), rx = px, ry = py, rz = pz;
     vec_copy_root(x, y);
     for (uint32_t j = 1; j < m; j++) {
         vec qx = vec_load(x[3 * j]), qy = vec_load(x[3 * j + 1]), qz = vec_load(x[3 * j + 2]);
-        vec ex = qx - px, ey = qy - py, ez = qz - pz;
-        vec_sincos_turns(rate * vec_load(bent[j]), &s, &c);
+        vec ex = qx - px, ey = qy - py, ez = qz - pz, s = vec_load(sine[j]), c = vec_load(cosine[j]);
         vec along = (1.0f - c) * (a[0] * ex + a[1] * ey + a[2] * ez);
         rx += c * ex + s * (a[1] * ez - a[2] * ey) + along * a[0];
         ry += c * ey + s * (a[2] * ex - a[0] * ez) + along * a[1];
@@ -90,11 +105,17 @@ LANES_INLINE void bend_turn(uint32_t m, const vec a[3], vec rate, const lanes *r
 
 LANES_INLINE void bend_forward(const struct kernel_inputs *in, struct bundle x, struct bundle y, lanes *scratch)
 {
-    vec rate = in->parameter[ANGLE] * TURNS_IN_RADIAN * bend_sums(in, (const lanes *)x.at, y.at, scratch), s, c, a[3];
-    vec_sincos_turns(0.5f * vec_load(in->random[0]), &s, &c);
+    lanes *bent = scratch, *sine = scratch + in->m, *cosine = scratch + 2 * in->m;
+    float angle = in->parameter[ANGLE] * HALVES_IN_RADIAN;
+    vec rate = angle * bend_sums(in, (const lanes *)x.at, y.at, bent), s, c, a[3];
+    if (fabsf(angle) < 0.49f)
+        bend_angles(in->m, 1, rate, (const lanes *)bent, sine, cosine);
+    else
+        bend_angles(in->m, 0, rate, (const lanes *)bent, sine, cosine);
+    vec_sincos_halves(vec_load(in->random[0]), &s, &c);
     for (int k = 0; k < 3; k++)
         a[k] = c * vec_load(in->axis[k]) + s * vec_load(in->axis[3 + k]);
-    bend_turn(in->m, a, rate, (const lanes *)scratch, (const lanes *)x.points, y.points);
+    bend_turn(in->m, a, (const lanes *)sine, (const lanes *)cosine, (const lanes *)x.points, y.points);
 }
 
 /* Tip to root through the rotations. d leaves with the adjoint of segment j in vertex j + 1 and that

@@ -16,8 +16,10 @@ struct block block_of(const uint32_t *strand, uint32_t n);
 
 /* Eq. 3 relative to the root: sum over k of weight (guide_j - guide_1).
  * relative  [n_g][3m] guides relative to their roots; those of the block's strands are looked at
+ * factor    what each lane's strand is scaled by on the way, or NULL
  * x         [3m] */
-void block_instance(const struct groom *groom, const float *relative, const struct block *block, lanes *x);
+void block_instance(const struct groom *groom, const float *relative, const struct block *block, const float *factor,
+                    lanes *x);
 
 /* Rows [n] side by side.
  * subtract  one 3-vector of each lane, taken from each of its points, or NULL */

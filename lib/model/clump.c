@@ -6,39 +6,29 @@
 
 enum { PROFILE };
 
-/* at_y: measured where it is not NULL */
 LANES_INLINE void clump_vertices(const struct kernel_inputs *in, const lanes *restrict x, const lanes *restrict at,
-                                 lanes *restrict y, lanes *restrict at_y)
+                                 lanes *restrict y)
 {
     vec root[3] = {vec_load(in->root[0]), vec_load(in->root[1]), vec_load(in->root[2])};
     vec rate = -LOG2_E * in->parameter[PROFILE] * vec_inverse(vec_load(at[in->m - 1]));
-    struct measure measure = measure_from(x);
     vec_copy_root(x, y);
-    if (at_y)
-        vec_store(at_y[0], measure.length);
     for (uint32_t j = 1; j < in->m; j++) {
         const lanes *p = x + 3 * j, *g = in->guide + 3 * j;
         lanes *q = y + 3 * j;
         vec a = 1.0f - vec_exp2(rate * vec_load(at[j]));
         vec px = vec_load(p[0]), py = vec_load(p[1]), pz = vec_load(p[2]);
-        vec qx = px + a * (vec_load(g[0]) - root[0] - px);
-        vec qy = py + a * (vec_load(g[1]) - root[1] - py);
-        vec qz = pz + a * (vec_load(g[2]) - root[2] - pz);
-        vec_store(q[0], qx), vec_store(q[1], qy), vec_store(q[2], qz);
-        if (at_y) {
-            measure_to(&measure, qx, qy, qz);
-            vec_store(at_y[j], measure.length);
-        }
+        vec_store(q[0], px + a * (vec_load(g[0]) - root[0] - px));
+        vec_store(q[1], py + a * (vec_load(g[1]) - root[1] - py));
+        vec_store(q[2], pz + a * (vec_load(g[2]) - root[2] - pz));
     }
 }
 
 LANES_INLINE void clump_forward(const struct kernel_inputs *in, struct bundle x, struct bundle y, lanes *scratch)
 {
     (void)scratch;
+    clump_vertices(in, (const lanes *)x.points, (const lanes *)x.at, y.points);
     if (y.at)
-        clump_vertices(in, (const lanes *)x.points, (const lanes *)x.at, y.points, y.at);
-    else
-        clump_vertices(in, (const lanes *)x.points, (const lanes *)x.at, y.points, NULL);
+        vec_measure(in->m, (const lanes *)y.points, y.at);
 }
 
 LANES_INLINE void clump_backward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,

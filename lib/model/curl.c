@@ -24,43 +24,42 @@ LANES_INLINE void turning(const struct kernel_inputs *in, float *restrict rate, 
     }
 }
 
-/* at_y: measured where it is not NULL */
-LANES_INLINE void curl_vertices(const struct kernel_inputs *in, const lanes *restrict x, const lanes *restrict at,
-                                lanes *restrict y, lanes *restrict at_y)
+/* zeta' rho': how far each vertex is moved. */
+LANES_INLINE void curl_sizes(const struct kernel_inputs *in, const lanes *restrict at, lanes *restrict size)
+{
+    vec inverse = vec_inverse(vec_load(at[in->m - 1])), growth = in->parameter[RADIUS] * RADIUS_GROWTH * inverse;
+    struct beginning beginning = beginning_of(in->parameter[START], inverse);
+    float at_root = in->parameter[RADIUS] * RADIUS_AT_ROOT;
+    for (uint32_t j = 1; j < in->m; j++) {
+        vec s = vec_load(at[j]);
+        vec_store(size[j], (at_root + growth * s) * vec_begun(&beginning, s));
+    }
+}
+
+LANES_INLINE void curl_vertices(const struct kernel_inputs *in, const lanes *restrict size, const lanes *restrict x,
+                                const lanes *restrict at, lanes *restrict y)
 {
     lanes rates, shifts;
-    float radius = in->parameter[RADIUS], start = in->parameter[START];
     turning(in, rates, shifts);
-    vec rate = vec_load(rates), shift = vec_load(shifts), inverse = vec_inverse(vec_load(at[in->m - 1])), sine, cosine;
-    struct measure measure = measure_from(x);
+    vec rate = 2.0f * vec_load(rates), shift = 2.0f * vec_load(shifts), sine, cosine; /* in half turns */
     vec_copy_root(x, y);
-    if (at_y)
-        vec_store(at_y[0], measure.length);
     for (uint32_t j = 1; j < in->m; j++) {
         const lanes *p = x + 3 * j, *frame = in->frame + FRAME_WIDTH * j;
         lanes *q = y + 3 * j;
-        vec s = vec_load(at[j]), v = s * inverse;
-        vec size = radius * (RADIUS_AT_ROOT + RADIUS_GROWTH * v) * vec_begun(v, start);
-        vec_sincos_turns(vec_at_most(s * rate + shift, MANY_TURNS), &sine, &cosine);
-        vec along_n = size * sine, along_b = size * cosine;
-        vec qx = vec_load(p[0]) + (along_n * vec_load(frame[0]) + along_b * vec_load(frame[2]));
-        vec qy = vec_load(p[1]) + (along_n * vec_load(frame[1]) + along_b * vec_load(frame[3]));
-        vec qz = vec_load(p[2]) + along_b * vec_load(frame[4]);
-        vec_store(q[0], qx), vec_store(q[1], qy), vec_store(q[2], qz);
-        if (at_y) {
-            measure_to(&measure, qx, qy, qz);
-            vec_store(at_y[j], measure.length);
-        }
+        vec_sincos_halves(vec_at_most(vec_load(at[j]) * rate + shift, 2.0f * MANY_TURNS), &sine, &cosine);
+        vec along_n = vec_load(size[j]) * sine, along_b = vec_load(size[j]) * cosine;
+        vec_store(q[0], vec_load(p[0]) + (along_n * vec_load(frame[0]) + along_b * vec_load(frame[2])));
+        vec_store(q[1], vec_load(p[1]) + (along_n * vec_load(frame[1]) + along_b * vec_load(frame[3])));
+        vec_store(q[2], vec_load(p[2]) + along_b * vec_load(frame[4]));
     }
 }
 
 LANES_INLINE void curl_forward(const struct kernel_inputs *in, struct bundle x, struct bundle y, lanes *scratch)
 {
-    (void)scratch;
+    curl_sizes(in, (const lanes *)x.at, scratch);
+    curl_vertices(in, (const lanes *)scratch, (const lanes *)x.points, (const lanes *)x.at, y.points);
     if (y.at)
-        curl_vertices(in, (const lanes *)x.points, (const lanes *)x.at, y.points, y.at);
-    else
-        curl_vertices(in, (const lanes *)x.points, (const lanes *)x.at, y.points, NULL);
+        vec_measure(in->m, (const lanes *)y.points, y.at);
 }
 
 LANES_INLINE void curl_backward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,

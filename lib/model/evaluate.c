@@ -9,8 +9,9 @@
 #include "model/plan.h"
 
 #define SMALLEST_PIECE 64 /* strands */
-#define LARGEST_PIECE 2048 /* whose small arrays stay in the second cache */
+#define LARGEST_PIECE 2048
 #define PIECES 64
+#define CACHE_LINE 64
 
 struct evaluation {
     struct plan plan;
@@ -18,28 +19,44 @@ struct evaluation {
     uint32_t first, count, piece_size;
     size_t first_vertex;
     int uneven;      /* strands have different numbers of vertices */
-    uint32_t n_keys;
-    uint32_t *order; /* [count] strands, in each piece those of one key together */
-    uint32_t *next;  /* [threads][n_keys] for sorting */
+    uint32_t *order; /* [count] strands, those of one key together */
     float (*out)[3];
 };
 
-static void store_block(const struct evaluation *job, const struct block *block, uint32_t m, const lanes *x)
+/* Ask for the memory that a row will be written to: all strands are more than a cache holds, and neighbours in a
+ * block are none in memory. WebAssembly has no instruction for it; a store does the same, for nobody waits for it. */
+static void fetch_row(float *row, uint32_t n)
 {
-    const float *root[LANES];
-    float *row[LANES];
-    plan_roots(&job->plan, block, root);
-    for (uint32_t l = 0; l < block->n; l++)
-        row[l] = job->out[groom_first_vertex(job->plan.groom, block->strand[l]) - job->first_vertex];
-    block_to_rows(x, root, 3 * m, row, block->n);
+    for (uint32_t i = 0; i < n; i += CACHE_LINE / sizeof *row) {
+#ifdef __wasm__
+        *(volatile float *)(row + i) = 0.0f;
+#else
+        __builtin_prefetch(row + i, 1);
+#endif
+    }
+}
+
+/* Rows of the lanes `step`, step + n_steps, ... */
+static void fetch_rows(float *const row[LANES], uint32_t n_rows, uint32_t m, uint32_t step, uint32_t n_steps)
+{
+    for (uint32_t l = step; l < n_rows; l += n_steps)
+        fetch_row(row[l], 3 * m);
 }
 
 static void evaluate_block(const struct evaluation *job, const struct block *block, struct workspace *w)
 {
-    plan_load(&job->plan, block, w);
-    for (uint32_t a = 0; a < job->plan.n_active; a++)
-        plan_apply(&job->plan, block, w, a, workspace_state(w, a % 2), workspace_state(w, (a + 1) % 2));
-    store_block(job, block, w->m, (const lanes *)workspace_state(w, job->plan.n_active % 2).points);
+    const struct plan *plan = &job->plan;
+    const float *root[LANES];
+    float *row[LANES];
+    plan_roots(plan, block, root);
+    for (uint32_t l = 0; l < LANES; l++)
+        row[l] = job->out[groom_first_vertex(plan->groom, block->strand[l]) - job->first_vertex];
+    uint32_t first = plan_load_scaled(plan, block, w), n = plan->n_active - first;
+    for (uint32_t a = 0; a < n; a++) {
+        fetch_rows(row, block->n, w->m, a, n);
+        plan_apply(plan, block, w, first + a, workspace_state(w, a % 2), workspace_state(w, (a + 1) % 2));
+    }
+    block_to_rows((const lanes *)workspace_state(w, n % 2).points, root, 3 * w->m, row, block->n);
 }
 
 /* Strands of one block must have as many vertices; and it is well that they share their operator guide. */
@@ -51,21 +68,32 @@ static uint32_t key_of(const struct evaluation *job, uint32_t strand)
     return groom->n_operator_guides ? groom->operator_guide_of[strand] : 0;
 }
 
-/* Counting sort of a piece's strands by operator guide: the lanes of a block then mostly share their
- * guides, which stay in the cache. It changes no bit, for no lane looks at another. */
-static void sort_piece(const struct evaluation *job, uint32_t begin, uint32_t end, uint32_t *next)
+/* Counting sort of the strands by operator guide: the lanes of a block, and neighbouring blocks, then mostly
+ * share their guides. It changes no bit, for no lane looks at another. */
+static void sort_strands(struct evaluation *job, uint32_t n_keys, uint32_t *next)
 {
-    uint32_t n = job->n_keys, sum = 0;
-    memset(next, 0, n * sizeof *next);
-    for (uint32_t i = begin; i < end; i++)
+    uint32_t sum = 0;
+    for (uint32_t i = 0; i < job->count; i++)
         next[key_of(job, job->first + i)]++;
-    for (uint32_t o = 0; o < n; o++) {
+    for (uint32_t o = 0; o < n_keys; o++) {
         uint32_t size = next[o];
         next[o] = sum;
         sum += size;
     }
-    for (uint32_t i = begin; i < end; i++)
-        job->order[begin + next[key_of(job, job->first + i)]++] = job->first + i;
+    for (uint32_t i = 0; i < job->count; i++)
+        job->order[next[key_of(job, job->first + i)]++] = job->first + i;
+}
+
+static groom_status make_order(struct evaluation *job, const struct groom_allocator *allocator)
+{
+    const struct groom *groom = job->plan.groom;
+    uint32_t n_keys = job->uneven ? groom->n_vertices + 1 : groom->n_operator_guides ? groom->n_operator_guides : 1;
+    uint32_t *next = memory_array_zero(allocator, n_keys, sizeof *next);
+    job->order = memory_array(allocator, job->count, sizeof *job->order);
+    if (next && job->order)
+        sort_strands(job, n_keys, next);
+    memory_release(allocator, next, n_keys, sizeof *next);
+    return next && job->order ? GROOM_OK : GROOM_ENOMEM;
 }
 
 /* How many of the strands from i on make one block. */
@@ -85,7 +113,6 @@ static void evaluate_piece(void *user, uint32_t piece, uint32_t thread)
     uint32_t begin = piece * job->piece_size;
     uint32_t end = job->count - begin < job->piece_size ? job->count : begin + job->piece_size;
     struct workspace *w = &job->workspace[thread];
-    sort_piece(job, begin, end, job->next + (size_t)thread * job->n_keys);
     for (uint32_t i = begin, n; i < end; i += n) {
         n = block_size(job, i, end);
         struct block block = block_of(job->order + i, n);
@@ -106,11 +133,9 @@ static groom_status evaluation_allocate(struct evaluation *job, uint32_t n_threa
                                         const struct groom_allocator *allocator)
 {
     const struct groom *groom = job->plan.groom;
-    groom_status status = GROOM_OK;
-    job->order = memory_array(allocator, job->count, sizeof *job->order);
-    job->next = memory_array(allocator, (size_t)n_threads * job->n_keys, sizeof *job->next);
+    groom_status status = make_order(job, allocator);
     job->workspace = memory_array_zero(allocator, n_threads, sizeof *job->workspace);
-    if (!job->order || !job->next || !job->workspace)
+    if (!job->workspace)
         return GROOM_ENOMEM;
     for (uint32_t t = 0; t < n_threads && status == GROOM_OK; t++)
         status = workspace_init(&job->workspace[t], groom->n_vertices, 2, allocator);
@@ -122,7 +147,6 @@ static void evaluation_release(struct evaluation *job, uint32_t n_threads, const
     for (uint32_t t = 0; job->workspace && t < n_threads; t++)
         workspace_finish(&job->workspace[t], allocator);
     memory_release(allocator, job->workspace, n_threads, sizeof *job->workspace);
-        memory_release(allocator, job->next, (size_t)n_threads * job->n_keys, sizeof *job->next);
     memory_release(allocator, job->order, job->count, sizeof *job->order);
     plan_finish(&job->plan);
 }
@@ -158,7 +182,6 @@ groom_status evaluate_with(enum kernel_variant variant, const struct groom *groo
         return status;
     job.first_vertex = groom_first_vertex(groom, first);
     job.uneven = is_uneven(groom);
-    job.n_keys = job.uneven ? groom->n_vertices + 1 : groom->n_operator_guides ? groom->n_operator_guides : 1;
     status = plan_init(&job.plan, groom, NULL, first, count, variant, context);
     if (status == GROOM_OK && groom->base && job.plan.n_active == 0) { /* as they are: root and back would round */
         memcpy(out, groom->base + job.first_vertex,

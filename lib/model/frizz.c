@@ -52,49 +52,37 @@ LANES_INLINE vec noise_cubic(const struct noise_place *place, uint32_t skip)
     return c[0] + f * (c[1] + f * (c[2] + f * c[3]));
 }
 
-/* All vertices are near. at_y: measured where it is not NULL */
+/* All vertices are near. */
 LANES_INLINE void frizz_near(const struct kernel_inputs *in, const lanes *restrict x, const lanes *restrict at,
-                             lanes *restrict y, lanes *restrict at_y)
+                             lanes *restrict y)
 {
     float frequency = in->parameter[FREQUENCY], half = 0.5f * in->parameter[AMPLITUDE];
     vec shift = RANDOM_SHIFT * vec_load(in->random[0]);
-    struct measure measure = measure_from(x);
     for (uint32_t j = 1; j < in->m; j++) {
         const lanes *p = x + 3 * j;
         lanes *q = y + 3 * j;
         struct noise_place place = noise_place_of(in->noise, frequency * vec_load(at[j]) + shift);
-        vec qx = vec_load(p[0]) + half * noise_cubic(&place, 0);
-        vec qy = vec_load(p[1]) + half * noise_cubic(&place, NOISE_OFFSET_Y);
-        vec qz = vec_load(p[2]) + half * noise_cubic(&place, NOISE_OFFSET_Z);
-        vec_store(q[0], qx), vec_store(q[1], qy), vec_store(q[2], qz);
-        if (at_y) {
-            measure_to(&measure, qx, qy, qz);
-            vec_store(at_y[j], measure.length);
-        }
+        vec_store(q[0], vec_load(p[0]) + half * noise_cubic(&place, 0));
+        vec_store(q[1], vec_load(p[1]) + half * noise_cubic(&place, NOISE_OFFSET_Y));
+        vec_store(q[2], vec_load(p[2]) + half * noise_cubic(&place, NOISE_OFFSET_Z));
     }
 }
 
 /* The same where some are not: those get epsilon itself. */
 LANES_INLINE void frizz_far(const struct kernel_inputs *in, const lanes *restrict x, const lanes *restrict at,
-                            lanes *restrict y, lanes *restrict at_y)
+                            lanes *restrict y)
 {
     const float offset[3] = NOISE_OFFSETS;
     const uint32_t skip[3] = {0, NOISE_OFFSET_Y, NOISE_OFFSET_Z};
     float frequency = in->parameter[FREQUENCY], half = 0.5f * in->parameter[AMPLITUDE];
-    vec shift = RANDOM_SHIFT * vec_load(in->random[0]), q[3];
-    struct measure measure = measure_from(x);
+    vec shift = RANDOM_SHIFT * vec_load(in->random[0]);
     for (uint32_t j = 1; j < in->m; j++) {
         vec chi = vec_at_most(frequency * vec_load(at[j]), MANY_TURNS) + shift;
         ivec near = (chi >= 0.0f) & (chi < (float)NOISE_NEAR);
         struct noise_place place = noise_place_of(in->noise, (vec)((ivec)chi & near));
         for (uint32_t c = 0; c < 3; c++) {
             vec epsilon = vec_choose(near, noise_cubic(&place, skip[c]), vec_epsilon(chi + offset[c]));
-            q[c] = vec_load(x[3 * j + c]) + half * epsilon;
-            vec_store(y[3 * j + c], q[c]);
-        }
-        if (at_y) {
-            measure_to(&measure, q[0], q[1], q[2]);
-            vec_store(at_y[j], measure.length);
+            vec_store(y[3 * j + c], vec_load(x[3 * j + c]) + half * epsilon);
         }
     }
 }
@@ -104,14 +92,12 @@ LANES_INLINE void frizz_forward(const struct kernel_inputs *in, struct bundle x,
     const lanes *points = (const lanes *)x.points, *at = (const lanes *)x.at;
     (void)scratch;
     vec_copy_root(points, y.points);
-    if (y.at)
-        vec_store(y.at[0], (vec){0});
-    if (!all_near(in->random[0], at[in->m - 1], in->parameter[FREQUENCY]))
-        frizz_far(in, points, at, y.points, y.at);
-    else if (y.at)
-        frizz_near(in, points, at, y.points, y.at);
+    if (all_near(in->random[0], at[in->m - 1], in->parameter[FREQUENCY]))
+        frizz_near(in, points, at, y.points);
     else
-        frizz_near(in, points, at, y.points, NULL);
+        frizz_far(in, points, at, y.points);
+    if (y.at)
+        vec_measure(in->m, (const lanes *)y.points, y.at);
 }
 
 LANES_INLINE void frizz_backward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,

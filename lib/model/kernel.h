@@ -55,6 +55,9 @@ struct operator_kernels {
     kernel_backward *backward[KERNEL_VARIANTS];
 };
 
+/* What a scale makes its strands longer by. */
+void scale_factor(const struct kernel_inputs *in, float *factor);
+
 /* The arc lengths of strands that no operator has made. */
 typedef void kernel_measure(uint32_t m, const lanes *restrict x, lanes *restrict at);
 extern kernel_measure *const kernel_measures[KERNEL_VARIANTS];

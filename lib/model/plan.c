@@ -232,20 +232,6 @@ struct bundle workspace_state(const struct workspace *w, uint32_t i)
     return (struct bundle){.points = points, .at = points + (size_t)3 * w->m};
 }
 
-void plan_load(const struct plan *plan, const struct block *block, struct workspace *w)
-{
-    if (plan->groom->base)
-        load_base(plan, block, w);
-    else
-        block_instance(plan->groom, plan->relative, block, w->state);
-    for (uint32_t l = 0; l < LANES; l++)
-        for (int c = 0; c < 3; c++)
-            w->root[c][l] = model_root(plan->groom, block->strand[l])[c];
-    load_operator_guides(plan, block, w);
-    if (plan->n_active > 0)
-        kernel_measures[plan->variant](w->m, (const lanes *)w->state, workspace_state(w, 0).at);
-}
-
 struct kernel_inputs plan_inputs(const struct plan *plan, const struct block *block, const struct workspace *w,
                                  uint32_t a)
 {
@@ -259,6 +245,51 @@ struct kernel_inputs plan_inputs(const struct plan *plan, const struct block *bl
                 op->random[r][groom_operator_random_per_guide(op->type) ? plan->groom->operator_guide_of[strand] : strand];
         }
     return in;
+}
+
+/* What all begins with; factor: of block_instance. */
+static void load_strands(const struct plan *plan, const struct block *block, const float *factor, struct workspace *w)
+{
+    if (plan->groom->base)
+        load_base(plan, block, w);
+    else
+        block_instance(plan->groom, plan->relative, block, factor, w->state);
+    for (uint32_t l = 0; l < LANES; l++)
+        for (int c = 0; c < 3; c++)
+            w->root[c][l] = model_root(plan->groom, block->strand[l])[c];
+    load_operator_guides(plan, block, w);
+}
+
+static void measure(const struct plan *plan, struct workspace *w)
+{
+    kernel_measures[plan->variant](w->m, (const lanes *)w->state, workspace_state(w, 0).at);
+}
+
+void plan_load(const struct plan *plan, const struct block *block, struct workspace *w)
+{
+    load_strands(plan, block, NULL, w);
+    if (plan->n_active > 0)
+        measure(plan, w);
+}
+
+static int begins_with_scale(const struct plan *plan)
+{
+    return plan->n_active > 0 && plan->groom->operators[plan->active[0]].type == GROOM_OPERATOR_SCALE;
+}
+
+uint32_t plan_load_scaled(const struct plan *plan, const struct block *block, struct workspace *w)
+{
+    lanes factor;
+    if (plan->groom->base || !begins_with_scale(plan)) {
+        plan_load(plan, block, w);
+        return 0;
+    }
+    struct kernel_inputs in = plan_inputs(plan, block, w, 0);
+    scale_factor(&in, factor);
+    load_strands(plan, block, factor, w);
+    if (plan->n_active > 1)
+        measure(plan, w);
+    return 1;
 }
 
 void plan_apply(const struct plan *plan, const struct block *block, struct workspace *w, uint32_t a, struct bundle x,

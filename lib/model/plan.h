@@ -52,6 +52,9 @@ struct bundle workspace_state(const struct workspace *workspace, uint32_t i);
 
 /* Instance the block into state 0, measure it and bring its operator guides into the lanes. */
 void plan_load(const struct plan *plan, const struct block *block, struct workspace *workspace);
+/* The same for those who do not ask for the states between: a scale that comes first is applied on the way, to the
+ * same bits. returns the first active operator that is left */
+uint32_t plan_load_scaled(const struct plan *plan, const struct block *block, struct workspace *workspace);
 
 /* The kernels' view of the a-th active operator. */
 struct kernel_inputs plan_inputs(const struct plan *plan, const struct block *block,

@@ -5,19 +5,26 @@
 
 enum { RANDOM_SCALE };
 
+void scale_factor(const struct kernel_inputs *in, float *factor)
+{
+    FOR_LANES(l) factor[l] = 1.0f + in->parameter[RANDOM_SCALE] * in->random[0][l];
+}
+
 LANES_INLINE void scale_lines(uint32_t n, vec factor, const lanes *restrict x, lanes *restrict y)
 {
     for (uint32_t i = 0; i < n; i++)
         vec_store(y[i], factor * vec_load(x[i]));
 }
 
+/* Measured anew, for the same bits as where strands are scaled before they are measured (plan_load_scaled). */
 LANES_INLINE void scale_forward(const struct kernel_inputs *in, struct bundle x, struct bundle y, lanes *scratch)
 {
+    lanes factor;
     (void)scratch;
-    vec factor = 1.0f + in->parameter[RANDOM_SCALE] * vec_load(in->random[0]);
-    scale_lines(3 * in->m, factor, (const lanes *)x.points, y.points);
+    scale_factor(in, factor);
+    scale_lines(3 * in->m, vec_load(factor), (const lanes *)x.points, y.points);
     if (y.at)
-        scale_lines(in->m, vec_choose(factor < 0.0f, -factor, factor), (const lanes *)x.at, y.at);
+        vec_measure(in->m, (const lanes *)y.points, y.at);
 }
 
 LANES_INLINE void scale_backward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,

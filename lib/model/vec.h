@@ -115,25 +115,48 @@ LANES_INLINE vec vec_inverse(vec x)
     return (vec)((ivec)(1.0f / vec_choose(is_length, x, vec_of(1.0f))) & is_length);
 }
 
-LANES_INLINE vec vec_exp2(vec x)
+/* 2^x for x from -126 to 127. */
+LANES_INLINE vec vec_exp2_near(vec x)
 {
-    x = vec_at_least(x, -126.0f);
     vec rounded = x + ROUNDER, r = x - (rounded - ROUNDER), z = r * r;
     return (vec)((ivec)EXP2_POLYNOMIAL(r, z) + (ivec)((uvec)rounded << 23));
 }
 
-LANES_INLINE vec vec_begun(vec v, float start)
+LANES_INLINE vec vec_exp2(vec x) { return vec_exp2_near(vec_at_least(x, -126.0f)); }
+
+/* zeta' along strands: what is the same for all vertices of one. start is 0 to 1. */
+struct beginning {
+    vec slope;
+    float at_root;
+};
+
+LANES_INLINE struct beginning beginning_of(float start, vec inverse_length)
 {
-    return 1.0f / (1.0f + vec_exp2((START_STEEPNESS * LOG2_E) * (start - v)));
+    const float steep = START_STEEPNESS * LOG2_E;
+    return (struct beginning){.slope = steep * inverse_length, .at_root = steep * start};
 }
 
-LANES_INLINE void vec_sincos_turns(vec turns, vec *sine, vec *cosine)
+/* zeta' at arc length s. */
+LANES_INLINE vec vec_begun(const struct beginning *beginning, vec s)
 {
-    vec halves = turns * 2.0f, rounded = halves + ROUNDER;
-    vec r = halves - (rounded - ROUNDER), z = r * r;
+    return 1.0f / (1.0f + vec_exp2_near(beginning->at_root - beginning->slope * s));
+}
+
+/* Of pi halves, |halves| up to 1/2; then up to twice MANY_TURNS. */
+LANES_INLINE void vec_sincos_near(vec halves, vec *sine, vec *cosine)
+{
+    vec z = halves * halves;
+    *sine = SINE_POLYNOMIAL(halves, z);
+    *cosine = COSINE_POLYNOMIAL(z);
+}
+
+LANES_INLINE void vec_sincos_halves(vec halves, vec *sine, vec *cosine)
+{
+    vec rounded = halves + ROUNDER;
     ivec sign = (ivec)((uvec)rounded << 31);
-    *sine = (vec)((ivec)SINE_POLYNOMIAL(r, z) ^ sign);
-    *cosine = (vec)((ivec)COSINE_POLYNOMIAL(z) ^ sign);
+    vec_sincos_near(halves - (rounded - ROUNDER), sine, cosine);
+    *sine = (vec)((ivec)*sine ^ sign);
+    *cosine = (vec)((ivec)*cosine ^ sign);
 }
 
 LANES_INLINE vec vec_noise_gradient(ivec stepped)
@@ -161,21 +184,18 @@ LANES_INLINE vec vec_epsilon(vec t)
 
 /* --- arc length --------------------------------------------------------------------------------- */
 
-/* Arc length up to the last vertex that it was given. */
-struct measure {
-    vec x, y, z, length;
-};
-
-LANES_INLINE struct measure measure_from(const lanes *root)
+/* at[j], j < m: arc length from the root to vertex j. */
+LANES_INLINE void vec_measure(uint32_t m, const lanes *restrict x, lanes *restrict at)
 {
-    return (struct measure){.x = vec_load(root[0]), .y = vec_load(root[1]), .z = vec_load(root[2])};
-}
-
-LANES_INLINE void measure_to(struct measure *measure, vec x, vec y, vec z)
-{
-    vec ex = x - measure->x, ey = y - measure->y, ez = z - measure->z;
-    measure->length += vec_sqrt(ex * ex + ey * ey + ez * ez);
-    measure->x = x, measure->y = y, measure->z = z;
+    vec px = vec_load(x[0]), py = vec_load(x[1]), pz = vec_load(x[2]), length = {0};
+    vec_store(at[0], length);
+    for (uint32_t j = 1; j < m; j++) {
+        vec qx = vec_load(x[3 * j]), qy = vec_load(x[3 * j + 1]), qz = vec_load(x[3 * j + 2]);
+        vec ex = qx - px, ey = qy - py, ez = qz - pz;
+        length += vec_sqrt(ex * ex + ey * ey + ez * ez);
+        vec_store(at[j], length);
+        px = qx, py = qy, pz = qz;
+    }
 }
 
 LANES_INLINE void vec_copy_root(const lanes *restrict x, lanes *restrict y)

@@ -51,6 +51,25 @@ START_TEST(sincos_is_within_two_parts_in_ten_million)
 }
 END_TEST
 
+/* The same formulas with what a strand's vertices share taken out, or without the steps that do nothing there. */
+START_TEST(short_forms_agree_with_long_ones)
+{
+    for (int i = 0; i <= 1000; i++) {
+        lanes begun, sine, cosine, wanted_sine, wanted_cosine;
+        float length = 0.01f + 1e-3f * (float)i, v = 1e-3f * (float)i, halves = 0.49f * (2.0f * v - 1.0f);
+        struct beginning beginning = beginning_of(0.4f, vec_of(1.0f / length));
+        vec s, c;
+        vec_store(begun, vec_begun(&beginning, vec_of(v * length)));
+        ck_assert_double_lt(fabs(begun[0] - 1.0 / (1.0 + exp(-10.0 * ((double)v - 0.4f)))), 5e-7);
+        vec_sincos_near(vec_of(halves), &s, &c);
+        vec_store(sine, s), vec_store(cosine, c);
+        vec_sincos_halves(vec_of(halves), &s, &c);
+        vec_store(wanted_sine, s), vec_store(wanted_cosine, c);
+        ck_assert(sine[0] == wanted_sine[0] && cosine[0] == wanted_cosine[0]);
+    }
+}
+END_TEST
+
 START_TEST(noise_is_what_documents_mean_by_it)
 {
     /* worked out once from the definition in model/noise.h; never to change */
@@ -112,13 +131,12 @@ static void same_bits(vec got, const float *wanted)
 START_TEST(vectors_are_the_same_bits_as_lanes)
 {
     for (int i = 0; i < 200000; i++) {
-        lanes x, sine, cosine, power, begun, inverse, noise, floors, limited;
+        lanes x, sine, cosine, power, inverse, noise, floors, limited;
         int32_t cell;
         for (int l = 0; l < LANES; l++) {
             x[l] = (float)(i * LANES + l) * 2.741e-4f * (l & 1 && i % 3 ? -1.0f : 1.0f);
             lane_sincos_turns(x[l], &sine[l], &cosine[l]);
             power[l] = lane_exp2(0.5f * x[l]);
-            begun[l] = lane_begun(x[l] * 1e-2f, 0.4f);
             inverse[l] = lane_inverse(x[l]);
             noise[l] = noise_epsilon(fabsf(x[l]));
             floors[l] = lane_floor(x[l], &cell);
@@ -127,11 +145,10 @@ START_TEST(vectors_are_the_same_bits_as_lanes)
         }
         vec v = vec_load(x), s, c;
         ivec cells;
-        vec_sincos_turns(v, &s, &c);
+        vec_sincos_halves(2.0f * v, &s, &c);
         same_bits(s, sine);
         same_bits(c, cosine);
         same_bits(vec_exp2(0.5f * v), power);
-        same_bits(vec_begun(v * 1e-2f, 0.4f), begun);
         same_bits(vec_inverse(v), inverse);
         same_bits(vec_floor(v, &cells), floors);
         same_bits(vec_at_least(vec_at_most(v, 7.0f), -2.0f), limited);
@@ -141,5 +158,5 @@ START_TEST(vectors_are_the_same_bits_as_lanes)
 }
 END_TEST
 
-TEST_SUITE("model_math", exp2_is_within_three_ulps, vectors_are_the_same_bits_as_lanes, sincos_is_within_two_parts_in_ten_million,
+TEST_SUITE("model_math", exp2_is_within_three_ulps, vectors_are_the_same_bits_as_lanes, short_forms_agree_with_long_ones, sincos_is_within_two_parts_in_ten_million,
            noise_is_what_documents_mean_by_it, noise_looked_up_is_the_noise, noise_has_its_moments_and_its_slope)
