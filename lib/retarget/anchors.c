@@ -8,9 +8,9 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/progress.h"
 #include "geometry/vec.h"
 #include "retarget/field.h"
+#include "retarget/batches.h"
 #include "retarget/source.h"
 
 #define PIECE 2048            /* particles */
@@ -24,7 +24,6 @@ struct search {
     const uint32_t *regions;
     const struct groom_bvh *bvh;
     struct field field;
-    uint32_t first_piece;
     uint64_t *without;        /* [pieces] particles that no ray reached */
 };
 
@@ -166,11 +165,10 @@ static int choose(const struct search *search, const float point[3], struct anch
     return found;
 }
 
-static void anchor_piece(void *user, uint32_t index, uint32_t thread)
+static void anchor_piece(void *user, uint32_t piece, uint32_t thread)
 {
     struct search *search = user;
     const struct groom_strands *strands = search->source->strands;
-    uint32_t piece = search->first_piece + index;
     (void)thread;
     for (uint32_t i = piece * PIECE; i < strands->n_vertices && i - piece * PIECE < PIECE; i++)
         search->without[piece] += !choose(search, strands->points[i], &search->source->anchors[i]);
@@ -178,16 +176,12 @@ static void anchor_piece(void *user, uint32_t index, uint32_t thread)
 
 static groom_status search_all(struct search *search, const struct groom_context *context, struct groom_diag *diag)
 {
-    uint32_t n_pieces = search->source->strands->n_vertices / PIECE + 1;
-    for (uint32_t piece = 0; piece < n_pieces; piece += BATCH) {
-        uint32_t n = n_pieces - piece < BATCH ? n_pieces - piece : BATCH;
-        if (progress_cancelled(context))
-            return groom_fail(diag, GROOM_ECANCELLED, "cancelled while the bones of strands were looked for");
-        search->first_piece = piece;
-        parallel_for(context, n, anchor_piece, search);
-        progress_report(context, 0.5 * (piece + n) / n_pieces);
-    }
-    for (uint32_t i = 0; i < n_pieces; i++)
+    struct batches batches = {.n_pieces = search->source->strands->n_vertices / PIECE + 1, .batch = BATCH, .to = 0.5,
+                              .doing = "the bones of strands were looked for"};
+    groom_status st = batches_run(context, &batches, anchor_piece, search, diag);
+    if (st != GROOM_OK)
+        return st;
+    for (uint32_t i = 0; i < batches.n_pieces; i++)
         search->source->n_without_bone += search->without[i];
     return GROOM_OK;
 }

@@ -9,6 +9,7 @@
 #include "retarget/job.h"
 
 #define PIECE 64             /* strands */
+#define BATCH 32             /* pieces between two looks at progress */
 #define ROUNDS 60
 #define ROUNDS_GENTLE 12     /* after these each push goes farther than the one before: out of creases */
 #define BEYOND 1.001         /* pushed to so many clearances, so that what was pushed is clear */
@@ -150,6 +151,14 @@ struct clearing {
     struct groom_retarget_inside *inside; /* [pieces] */
 };
 
+static void count_before(struct job *job, const float (*p)[3], uint32_t n, uint32_t strand, struct groom_retarget_inside *inside)
+{
+    uint64_t last = inside->near_vertices + inside->segments;
+    count_strand(job, p, n, inside);
+    if (job->standing && inside->near_vertices + inside->segments > last)
+        job->standing[strand] = STANDING_IN_CONFLICT;
+}
+
 /* What was cleared to the end has nothing to count. */
 static void clear_piece(void *user, uint32_t piece, uint32_t thread)
 {
@@ -160,37 +169,41 @@ static void clear_piece(void *user, uint32_t piece, uint32_t thread)
     for (uint32_t i = piece * PIECE; i < strands->n_strands && i - piece * PIECE < PIECE; i++) {
         float(*p)[3] = clearing->points + strands->first[i];
         uint32_t n = strands->first[i + 1] - strands->first[i];
-        if (!clearing->push || !clear_strand(clearing->job, p, n))
+        if (!clearing->push)
+            count_before(clearing->job, (const float(*)[3])p, n, i, &clearing->inside[piece]);
+        else if (!(clearing->job->standing[i] & STANDING_STAYS) && !clear_strand(clearing->job, p, n))
             count_strand(clearing->job, (const float(*)[3])p, n, &clearing->inside[piece]);
     }
 }
 
-static groom_status run(struct clearing *clearing, struct groom_retarget_inside *inside, struct groom_diag *diag)
+static groom_status run(struct clearing *clearing, double from, double to, struct groom_retarget_inside *inside,
+                        struct groom_diag *diag)
 {
     struct job *job = clearing->job;
-    uint32_t n_pieces = job->source->strands->n_strands / PIECE + 1;
-    if (!(clearing->inside = memory_array(job->allocator, n_pieces, sizeof *clearing->inside)))
+    struct batches batches = {.n_pieces = job->source->strands->n_strands / PIECE + 1, .batch = BATCH, .from = from, .to = to,
+                              .doing = clearing->push ? "strands were moved out of the body" : "what is inside was counted"};
+    if (!(clearing->inside = memory_array(job->allocator, batches.n_pieces, sizeof *clearing->inside)))
         return groom_fail(diag, GROOM_ENOMEM, "no memory to count what is inside");
-    parallel_for(job->context, n_pieces, clear_piece, clearing);
+    groom_status st = batches_run(job->context, &batches, clear_piece, clearing, diag);
     *inside = (struct groom_retarget_inside){0};
-    for (uint32_t i = 0; i < n_pieces; i++) {
+    for (uint32_t i = 0; st == GROOM_OK && i < batches.n_pieces; i++) {
         inside->vertices += clearing->inside[i].vertices;
         inside->segments += clearing->inside[i].segments;
         inside->near_vertices += clearing->inside[i].near_vertices;
         inside->deepest = fmax(inside->deepest, clearing->inside[i].deepest);
     }
-    memory_release(job->allocator, clearing->inside, n_pieces, sizeof *clearing->inside);
-    return GROOM_OK;
+    memory_release(job->allocator, clearing->inside, batches.n_pieces, sizeof *clearing->inside);
+    return st;
 }
 
 groom_status clearance_apply(struct job *job, float (*points)[3], struct groom_retarget_inside *left, struct groom_diag *diag)
 {
     struct clearing clearing = {.job = job, .points = points, .push = 1};
-    return run(&clearing, left, diag);
+    return run(&clearing, ADAPTED, CLEARED, left, diag);
 }
 
 groom_status clearance_count(struct job *job, float (*points)[3], struct groom_retarget_inside *inside, struct groom_diag *diag)
 {
     struct clearing clearing = {.job = job, .points = points};
-    return run(&clearing, inside, diag);
+    return run(&clearing, TRANSFERRED, COUNTED, inside, diag);
 }

@@ -14,6 +14,7 @@ typedef void strand_pass(struct descent *s, uint32_t first, uint32_t end, uint32
 struct pass {
     struct descent *s;
     strand_pass *of_strand;
+    int of_all; /* strands, those that stay as well */
 };
 
 static void pass_piece(void *user, uint32_t piece, uint32_t thread)
@@ -21,14 +22,17 @@ static void pass_piece(void *user, uint32_t piece, uint32_t thread)
     const struct pass *pass = user;
     const struct coupled *hair = pass->s->hair;
     struct descent_sums sums = {0};
-    for (uint32_t o = piece * DESCENT_PIECE; o < hair->n_strands && o < (piece + 1) * DESCENT_PIECE; o++)
-        pass->of_strand(pass->s, hair->first[hair->order[o]], hair->first[hair->order[o] + 1], thread, &sums);
+    for (uint32_t o = piece * DESCENT_PIECE; o < hair->n_strands && o < (piece + 1) * DESCENT_PIECE; o++) {
+        uint32_t strand = hair->order[o];
+        if (pass->of_all || !hair->standing || !(hair->standing[strand] & STANDING_STAYS))
+            pass->of_strand(pass->s, hair->first[strand], hair->first[strand + 1], thread, &sums);
+    }
     pass->s->sums[piece] = sums;
 }
 
-static void pass_run(struct descent *s, strand_pass *of_strand)
+static void pass_run(struct descent *s, strand_pass *of_strand, int of_all)
 {
-    struct pass pass = {s, of_strand};
+    struct pass pass = {s, of_strand, of_all};
     parallel_for(s->job->context, s->n_pieces, pass_piece, &pass);
 }
 
@@ -120,7 +124,7 @@ void descent_turn_strand(struct descent *s, uint32_t first, uint32_t end, uint32
     }
 }
 
-void descent_turn(struct descent *s) { pass_run(s, descent_turn_strand); }
+void descent_turn(struct descent *s) { pass_run(s, descent_turn_strand, 0); }
 
 static void difference_strand(struct descent *s, uint32_t first, uint32_t end, uint32_t thread, struct descent_sums *sums)
 {
@@ -192,8 +196,8 @@ static void curve_strand(struct descent *s, uint32_t first, uint32_t end, uint32
 
 void descent_curve(struct descent *s)
 {
-    pass_run(s, difference_strand);
-    pass_run(s, curve_strand);
+    pass_run(s, difference_strand, 1);
+    pass_run(s, curve_strand, 1);
 }
 
 /* --- p and q ------------------------------------------------------------------------------------------ */
@@ -248,7 +252,7 @@ static void tell_piece(struct descent *s, uint32_t piece)
 
 void descent_move(struct descent *s)
 {
-    pass_run(s, descent_move_strand);
+    pass_run(s, descent_move_strand, 0);
     for (uint32_t piece = 0; piece < s->n_pieces; piece++)
         if (s->sums[piece].n_put_back > 0)
             tell_piece(s, piece);
@@ -343,7 +347,7 @@ void descent_force_strand(struct descent *s, uint32_t first, uint32_t end, uint3
     }
 }
 
-void descent_force(struct descent *s) { pass_run(s, descent_force_strand); }
+void descent_force(struct descent *s) { pass_run(s, descent_force_strand, 0); }
 
 /* --- the start --------------------------------------------------------------------------------------------- */
 
@@ -361,11 +365,18 @@ uint32_t descent_place_strand(struct descent *s, uint32_t first, uint32_t end)
     return n_put_back;
 }
 
-static void begin_strand(struct descent *s, uint32_t first, uint32_t end, uint32_t thread, struct descent_sums *sums)
+static void place_strand(struct descent *s, uint32_t first, uint32_t end, uint32_t thread, struct descent_sums *sums)
 {
     (void)thread;
     (void)sums;
     (void)descent_place_strand(s, first, end);
+}
+
+static void moved_strand(struct descent *s, uint32_t first, uint32_t end, uint32_t thread, struct descent_sums *sums)
+{
+    (void)thread;
+    (void)sums;
+    memset(s->put_back + first, 0, end - first);
     for (uint32_t i = first; i < end; i++)
         point_store(s->d[i], point_load(s->hair->p[i]) - point_load(s->hair->rest[i]));
 }
@@ -385,8 +396,9 @@ static void pulled_strand(struct descent *s, uint32_t first, uint32_t end, uint3
 
 void descent_begin(struct descent *s)
 {
-    pass_run(s, begin_strand);
-    pass_run(s, difference_strand);
-    pass_run(s, pulled_strand);
-    pass_run(s, descent_force_strand);
+    pass_run(s, place_strand, 0);
+    pass_run(s, moved_strand, 1);
+    pass_run(s, difference_strand, 1);
+    pass_run(s, pulled_strand, 1);
+    pass_run(s, descent_force_strand, 0);
 }

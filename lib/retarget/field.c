@@ -6,7 +6,9 @@
 #include "base/parallel.h"
 #include "geometry/bvh.h"
 #include "geometry/sides.h"
+#include "retarget/batches.h"
 
+#define BATCH 512         /* rows of the grid between two looks at progress */
 #define OFF_SURFACE 1e-4f /* metres from a triangle at which its sides are told */
 
 /* --- sides ---------------------------------------------------------------------------------- */
@@ -135,8 +137,8 @@ groom_status field_init(struct field *field, const struct groom_bvh *bvh, const 
     groom_status st = mark_rims(field, diag);
     if (st != GROOM_OK)
         return st;
-    parallel_for(context, field->size[1] * field->size[2], fill_row, field);
-    return GROOM_OK;
+    struct batches batches = {.n_pieces = field->size[1] * field->size[2], .batch = BATCH, .doing = "distances from the body were measured"};
+    return batches_run(context, &batches, fill_row, field, diag);
 }
 
 void field_finish(struct field *field)

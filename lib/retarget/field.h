@@ -26,7 +26,7 @@ enum field_side {
 };
 
 /* A field over the body where it is within `margin` of the box low..high, of about n_nodes nodes.
- * returns  GROOM_OK, GROOM_ENOMEM */
+ * returns  GROOM_OK, GROOM_ENOMEM, GROOM_ECANCELLED */
 groom_status field_init(struct field *field, const struct groom_bvh *bvh, const float low[3], const float high[3],
                         float margin, uint32_t n_nodes, const struct groom_context *context, struct groom_diag *diag);
 void field_finish(struct field *field); /* takes {0} */

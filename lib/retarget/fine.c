@@ -39,7 +39,6 @@ struct fine {
     const float (*at)[3];    /* energies: of these positions */
     float (*result)[3];      /* solving */
     struct fine_space *spaces;
-    uint32_t first_piece;
     struct groom_retarget_energy *energies; /* [pieces] */
     uint32_t *iterations;    /* [pieces] */
 };
@@ -259,6 +258,13 @@ static uint32_t adapt(const struct job *job, const struct fine_space *s)
     return iteration;
 }
 
+static uint32_t carry_on(const struct job *job, struct fine_space *s, uint32_t strand)
+{
+    if (job->standing[strand] & STANDING_STAYS)
+        return 0;
+    return job->options->tolerance > 0 ? descend(job, s) : adapt(job, s);
+}
+
 /* --- energies -------------------------------------------------------------------------------- */
 
 static void add_energy(const struct fine_space *s, struct groom_retarget_energy *energy)
@@ -282,19 +288,18 @@ static void add_energy(const struct fine_space *s, struct groom_retarget_energy 
 
 /* --- all strands ------------------------------------------------------------------------------- */
 
-static void fine_piece(void *user, uint32_t index, uint32_t thread)
+static void fine_piece(void *user, uint32_t piece, uint32_t thread)
 {
     struct fine *fine = user;
     const struct groom_retarget_source *source = fine->job->source;
     struct fine_space *s = &fine->spaces[thread];
-    uint32_t piece = fine->first_piece + index;
     for (uint32_t i = piece * PIECE; i < source->strands->n_strands && i - piece * PIECE < PIECE; i++) {
         uint32_t first = source->strands->first[i];
         if (source->is_guide[i])
             continue;
         load(fine, s, i);
         if (fine->result) {
-            uint32_t n = fine->job->options->tolerance > 0 ? descend(fine->job, s) : adapt(fine->job, s);
+            uint32_t n = carry_on(fine->job, s, i);
             fine->iterations[piece] = n > fine->iterations[piece] ? n : fine->iterations[piece];
             for (uint32_t j = 0; j < s->strand.n; j++)
                 to_floats(s->p[j], fine->result[first + j]);
@@ -338,16 +343,10 @@ static int space_init(struct fine_space *s, struct job *job, uint32_t longest)
 
 static groom_status run_batches(struct fine *fine, uint32_t n_pieces, struct groom_diag *diag)
 {
-    struct job *job = fine->job;
-    for (uint32_t piece = 0; piece < n_pieces; piece += BATCH) {
-        if (progress_cancelled(job->context))
-            return groom_fail(diag, GROOM_ECANCELLED, "cancelled while strands were adapted");
-        fine->first_piece = piece;
-        parallel_for(job->context, n_pieces - piece < BATCH ? n_pieces - piece : BATCH, fine_piece, fine);
-        if (fine->result)
-            progress_report(job->context, job->progress_from + (job->progress_to - job->progress_from) * piece / n_pieces);
-    }
-    return GROOM_OK;
+    const struct job *job = fine->job;
+    struct batches batches = {.n_pieces = n_pieces, .batch = BATCH, .from = job->progress_from,
+                              .to = fine->result ? job->progress_to : job->progress_from, .doing = "strands were adapted"};
+    return batches_run(job->context, &batches, fine_piece, fine, diag);
 }
 
 static groom_status fine_run(struct fine *fine, struct groom_retarget_energy *energy, struct groom_diag *diag)

@@ -5,8 +5,21 @@
 #ifndef RETARGET_JOB_H
 #define RETARGET_JOB_H
 
+#include "retarget/batches.h"
 #include "retarget/field.h"
 #include "retarget/source.h"
+
+/* How far each part of a run brings it, of 1. */
+#define TRANSFERRED 0.05
+#define COUNTED 0.1
+#define ADAPTED 0.9
+#define CLEARED 0.98
+
+/* What the initial transfer tells of a strand. */
+enum standing {
+    STANDING_STAYS = 1,      /* it is where it was and keeps the clearance: nothing moves it */
+    STANDING_IN_CONFLICT = 2 /* something of it is inside or too near */
+};
 
 struct job {
     const struct groom_retarget_source *source;
@@ -18,6 +31,7 @@ struct job {
     struct groom_bvh *bvh;       /* of the target's body */
     struct field field;
     float (*hat)[3];             /* [n_vertices] p-hat of Eq. 4, relative to the centre */
+    uint8_t *standing;           /* [n_strands] enum standing, as bits */
     float (*shift)[3];           /* [n_strands] how far a hairline edit moved each root; NULL: there is none */
     struct groom_retarget_report *report;
     float progress_from, progress_to;
@@ -60,6 +74,7 @@ groom_status fine_energy(struct job *job, const float (*guide_moved)[3], const f
 struct coupled {
     uint32_t n_strands, n;
     const uint32_t *first;       /* [n_strands + 1] */
+    const uint8_t *standing;     /* [n_strands] enum standing; or NULL: all may move */
     const uint32_t *order;       /* [n_strands] those that grow near each other are near in it */
     const float (*rest)[3];      /* [n] p-bar relative to the source's centre */
     const float (*hat)[3];       /* [n] p-hat */
@@ -98,7 +113,7 @@ float contact_away(const struct job *job, const float p[3]);
 
 /* Moves what is too near out of the body; roots stay. points [n_vertices] in metres; left: what could not be moved out. */
 groom_status clearance_apply(struct job *job, float (*points)[3], struct groom_retarget_inside *left, struct groom_diag *diag);
-/* Counts what is inside. points are as they were. */
+/* Counts what is inside and notes which strands that is of. points are as they were. */
 groom_status clearance_count(struct job *job, float (*points)[3], struct groom_retarget_inside *inside, struct groom_diag *diag);
 
 #endif

@@ -5,8 +5,8 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/progress.h"
 #include "retarget/kdtree.h"
+#include "retarget/batches.h"
 #include "retarget/source.h"
 
 #define PIECE 2048           /* rows */
@@ -20,7 +20,6 @@ struct linking {
     const uint32_t *owner;     /* strand of each row */
     const uint8_t *left_out;   /* by strand; or NULL */
     struct graph *graph;
-    uint32_t first_piece;
 };
 
 static void weigh(const struct kdtree_found *found, uint32_t n, uint32_t k, uint32_t *neighbour, float *weight)
@@ -46,11 +45,11 @@ static float bound_by(const struct linking *linking, const struct kdtree_found *
     return most;
 }
 
-static void link_piece(void *user, uint32_t index, uint32_t thread)
+static void link_piece(void *user, uint32_t piece, uint32_t thread)
 {
     struct linking *linking = user;
     struct graph *graph = linking->graph;
-    uint32_t first = (linking->first_piece + index) * PIECE, k = graph->k, n = 0, last_owner = UINT32_MAX;
+    uint32_t first = piece * PIECE, k = graph->k, n = 0, last_owner = UINT32_MAX;
     struct kdtree_found found[16];
     (void)thread;
     for (uint32_t i = first; i < graph->n_rows && i - first < PIECE; i++) {
@@ -68,15 +67,9 @@ static void link_piece(void *user, uint32_t index, uint32_t thread)
 
 static groom_status link_all(struct linking *linking, const struct groom_context *context, struct groom_diag *diag)
 {
-    uint32_t n_pieces = linking->graph->n_rows / PIECE + 1;
-    for (uint32_t piece = 0; piece < n_pieces; piece += BATCH) {
-        if (progress_cancelled(context))
-            return groom_fail(diag, GROOM_ECANCELLED, "cancelled while neighbours were looked for");
-        linking->first_piece = piece;
-        parallel_for(context, n_pieces - piece < BATCH ? n_pieces - piece : BATCH, link_piece, linking);
-        progress_report(context, 0.6 + 0.4 * piece / n_pieces);
-    }
-    return GROOM_OK;
+    struct batches batches = {.n_pieces = linking->graph->n_rows / PIECE + 1, .batch = BATCH, .from = 0.6, .to = 1,
+                              .doing = "neighbours were looked for"};
+    return batches_run(context, &batches, link_piece, linking, diag);
 }
 
 /* --- graphs --------------------------------------------------------------------- */

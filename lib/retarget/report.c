@@ -54,12 +54,21 @@ static int put_history(cJSON *object, const struct groom_retarget_report *report
     return 1;
 }
 
+static int put_movement(cJSON *object, const char *name, const struct groom_retarget_movement *movement)
+{
+    cJSON *json = put_object(object, name);
+    return json && put_number(json, "strands", movement->strands) && put_number(json, "mean", movement->mean) &&
+           put_number(json, "max", movement->max);
+}
+
 static int put_measures(cJSON *object, const struct groom_retarget_report *report)
 {
     cJSON *length = put_object(object, "length_ratio"), *movement = length ? put_object(object, "movement") : NULL;
     return movement && put_number(length, "min", report->length_ratio_min) &&
            put_number(length, "median", report->length_ratio_median) && put_number(length, "max", report->length_ratio_max) &&
-           put_number(movement, "mean", report->movement_mean) && put_number(movement, "max", report->movement_max);
+           put_number(movement, "mean", report->movement_mean) && put_number(movement, "max", report->movement_max) &&
+           put_movement(movement, "in_conflict", &report->movement_conflict) &&
+           put_movement(movement, "others", &report->movement_others) && put_number(object, "unchanged", report->n_unchanged);
 }
 
 static int put_seconds(cJSON *object, const struct groom_retarget_report *report)

@@ -95,9 +95,10 @@ groom_status job_init(struct job *job, const struct groom_retarget_source *sourc
     if ((st = field_init(&job->field, job->bvh, low, high, 0.05f, n_nodes, context, diag)) != GROOM_OK)
         return st;
     job->hat = memory_array(job->allocator, source->strands->n_vertices, sizeof *job->hat);
+    job->standing = memory_array_zero(job->allocator, source->strands->n_strands, 1);
     if (target->roots)
         job->shift = memory_array(job->allocator, source->strands->n_strands, sizeof *job->shift);
-    return job->hat && (job->shift || !target->roots)
+    return job->hat && job->standing && (job->shift || !target->roots)
                ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to retarget %u particles", source->strands->n_vertices);
 }
 
@@ -105,6 +106,7 @@ void job_finish(struct job *job)
 {
     const struct groom_strands *strands = job->source->strands;
     memory_release(job->allocator, job->hat, strands->n_vertices, sizeof *job->hat);
+    memory_release(job->allocator, job->standing, strands->n_strands, 1);
     memory_release(job->allocator, job->shift, strands->n_strands, sizeof *job->shift);
     field_finish(&job->field);
     groom_bvh_destroy(job->bvh);
@@ -116,6 +118,7 @@ void job_finish(struct job *job)
 struct gathered {
     struct coupled hair;
     uint32_t *first, *order;
+    uint8_t *standing;
     float (*rest)[3], (*hat)[3], *gamma;
 };
 
@@ -124,6 +127,7 @@ static void gathered_finish(struct gathered *g, const struct groom_allocator *al
     uint32_t n = g->hair.n;
     memory_release(allocator, g->first, (size_t)g->hair.n_strands + 1, sizeof *g->first);
     memory_release(allocator, g->order, g->hair.n_strands, sizeof *g->order);
+    memory_release(allocator, g->standing, g->hair.n_strands, 1);
     memory_release(allocator, g->rest, n, sizeof *g->rest);
     memory_release(allocator, g->hat, n, sizeof *g->hat);
     memory_release(allocator, g->gamma, n, sizeof *g->gamma);
@@ -167,20 +171,23 @@ static groom_status gather(const struct job *job, const uint32_t *which, uint32_
     g->hair = (struct coupled){.n_strands = n_strands, .n = n, .graph = graph};
     g->first = memory_array(job->allocator, (size_t)n_strands + 1, sizeof *g->first);
     g->order = memory_array(job->allocator, n_strands, sizeof *g->order);
+    g->standing = memory_array(job->allocator, n_strands, 1);
     g->rest = memory_array(job->allocator, n, sizeof *g->rest);
     g->hat = memory_array(job->allocator, n, sizeof *g->hat);
     g->gamma = job->shift ? memory_array(job->allocator, n, sizeof *g->gamma) : NULL;
     g->hair.p = memory_array(job->allocator, n, sizeof *g->hair.p);
-    if (!g->first || !g->order || !g->rest || !g->hat || (job->shift && !g->gamma) || !g->hair.p)
+    if (!g->first || !g->order || !g->standing || !g->rest || !g->hat || (job->shift && !g->gamma) || !g->hair.p)
         return groom_fail(diag, GROOM_ENOMEM, "no memory to adapt %u particles together", n);
     g->first[0] = 0;
     for (uint32_t i = 0; i < n_strands; i++) {
         uint32_t strand = which ? which[i] : i;
         g->first[i + 1] = g->first[i] + strands->first[strand + 1] - strands->first[strand];
+        g->standing[i] = job->standing[strand];
         gather_strand(job, g, i, strand);
     }
     g->hair.first = g->first;
     g->hair.order = g->order;
+    g->hair.standing = g->standing;
     g->hair.rest = (const float(*)[3])g->rest;
     g->hair.hat = (const float(*)[3])g->hat;
     g->hair.gamma = g->gamma;
@@ -282,13 +289,13 @@ groom_status job_adapt(struct job *job, float (*result)[3], struct groom_diag *d
     int global = job->options->mode == GROOM_RETARGET_GLOBAL;
     struct gathered g;
     double start = now();
-    job->progress_from = 0.1f;
-    job->progress_to = global ? 0.9f : 0.2f;
+    job->progress_from = COUNTED;
+    job->progress_to = global ? ADAPTED : 0.2f;
     groom_status st = global ? adapt_together(job, NULL, source->strands->n_strands, &source->among_all, result, &g, diag)
                              : adapt_together(job, source->guides, source->n_guides, &source->among_guides, result, &g, diag);
     job->report->seconds_coarse = now() - start;
     job->progress_from = 0.2f;
-    job->progress_to = 0.9f;
+    job->progress_to = ADAPTED;
     start = now();
     if (st == GROOM_OK && source_has_fine(source))
         st = adapt_fine(job, &g, result, diag);
@@ -303,15 +310,20 @@ groom_status job_adapt(struct job *job, float (*result)[3], struct groom_diag *d
 
 /* --- the result ------------------------------------------------------------------------------------------ */
 
-/* From relative to the centre to metres; a root of its own is kept to the bit. */
+/* From relative to the centre to metres; what stays and a root of its own are kept to the bit. */
 static void to_metres(const struct job *job, float (*points)[3])
 {
     const struct groom_strands *strands = job->source->strands;
     for (uint32_t i = 0; i < strands->n_vertices; i++)
         for (int c = 0; c < 3; c++)
             points[i][c] = (float)(points[i][c] + job->centre[c]);
-    for (uint32_t i = 0; job->shift && i < strands->n_strands; i++)
-        memcpy(points[strands->first[i]], job->target->roots[i], sizeof *points);
+    for (uint32_t i = 0; i < strands->n_strands; i++) {
+        uint32_t first = strands->first[i];
+        if (job->shift)
+            memcpy(points[first], job->target->roots[i], sizeof *points);
+        if (job->standing[i] & STANDING_STAYS)
+            memcpy(points + first, strands->points + first, (strands->first[i + 1] - first) * sizeof *points);
+    }
 }
 
 static int compare_floats(const void *a, const void *b)
@@ -351,15 +363,21 @@ static double distance(const float a[3], const float b[3])
 static void fill_values(const struct job *job, const float (*points)[3], const struct groom_retarget_values *values)
 {
     const struct groom_strands *strands = job->source->strands;
-    double sum = 0, most = 0;
-    for (uint32_t s = 0; s < strands->n_strands; s++)
+    struct groom_retarget_report *report = job->report;
+    uint64_t n_conflict = 0;
+    for (uint32_t s = 0; s < strands->n_strands; s++) {
+        int in_conflict = job->standing[s] & STANDING_IN_CONFLICT;
+        struct groom_retarget_movement *movement = in_conflict ? &report->movement_conflict : &report->movement_others;
+        movement->strands++;
+        n_conflict += in_conflict ? strands->first[s + 1] - strands->first[s] : 0;
+        report->n_unchanged += (job->standing[s] & STANDING_STAYS) != 0;
         for (uint32_t i = strands->first[s]; i < strands->first[s + 1]; i++) {
             float hat[3];
             for (int c = 0; c < 3; c++)
                 hat[c] = (float)(job->hat[i][c] + job->centre[c]);
             double way = distance(points[i], hat);
-            sum += way;
-            most = fmax(most, way);
+            movement->mean += way;
+            movement->max = fmax(movement->max, way);
             if (values && values->movement)
                 values->movement[i] = (float)way;
             if (values && values->depth) {
@@ -372,8 +390,11 @@ static void fill_values(const struct job *job, const float (*points)[3], const s
                 values->stretch[i] = was > 0 ? (float)(distance(points[i], points[i - 1]) / was) : 1;
             }
         }
-    job->report->movement_mean = sum / strands->n_vertices;
-    job->report->movement_max = most;
+    }
+    report->movement_mean = (report->movement_conflict.mean + report->movement_others.mean) / strands->n_vertices;
+    report->movement_max = fmax(report->movement_conflict.max, report->movement_others.max);
+    report->movement_conflict.mean /= n_conflict > 0 ? (double)n_conflict : 1;
+    report->movement_others.mean /= n_conflict < strands->n_vertices ? (double)(strands->n_vertices - n_conflict) : 1;
 }
 
 static groom_status finish(struct job *job, float (*points)[3], const struct groom_retarget_values *values,
@@ -420,7 +441,6 @@ groom_status groom_retarget_run(const struct groom_retarget_source *source, cons
         (st = transfer_all(&job, diag)) != GROOM_OK || (st = count_before(&job, out, diag)) != GROOM_OK)
         goto out;
     report->seconds_initial = now() - start;
-    progress_report(context, 0.1);
     if ((st = job_adapt(&job, out, diag)) != GROOM_OK || (st = finish(&job, out, values, diag)) != GROOM_OK)
         goto out;
     report->seconds_total = now() - start;

@@ -9,7 +9,9 @@
 #include "retarget/job.h"
 
 #define PIECE 64              /* strands */
+#define BATCH 32              /* pieces between two looks at progress */
 #define SHORTEST 1e-9         /* metres: shorter segments count as this long */
+#define STAYS 1e-6            /* metres: a strand whose particles all moved less is where it was */
 #define ROOT_DEPTH 1e-4f      /* metres: a root that was deeper below the surface comes to lie on it */
 
 /* --- Eq. 3 -------------------------------------------------------------------------- */
@@ -130,6 +132,14 @@ static double segment_length(const float a[3], const float b[3])
     return length > SHORTEST ? length : SHORTEST;
 }
 
+static int stays(const struct smoothing *s, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++)
+        if (s->e[i][0] * s->e[i][0] + s->e[i][1] * s->e[i][1] + s->e[i][2] * s->e[i][2] > STAYS * STAYS)
+            return 0;
+    return 1;
+}
+
 static uint64_t transfer_strand(struct job *job, const struct smoothing *s, uint32_t strand)
 {
     const struct groom_retarget_source *source = job->source;
@@ -146,6 +156,9 @@ static uint64_t transfer_strand(struct job *job, const struct smoothing *s, uint
         s->arc[i] = i ? s->arc[i - 1] + segment_length(rest[i - 1], rest[i]) : 0;
     }
     uint32_t n_free = smooth(s, n, job->options);
+    job->standing[strand] = !job->shift && stays(s, n) ? STANDING_STAYS : 0;
+    if (job->standing[strand] & STANDING_STAYS) /* to the bit */
+        memset(s->e, 0, n * sizeof *s->e);
     for (uint32_t i = 0; i < n; i++)
         for (int c = 0; c < 3; c++)
             job->hat[first + i][c] = (float)(rest[i][c] + s->e[i][c] - job->centre[c]);
@@ -184,19 +197,19 @@ groom_status transfer_all(struct job *job, struct groom_diag *diag)
     struct transfer transfer = {.job = job};
     transfer.spaces = memory_array_zero(job->allocator, n_threads, sizeof *transfer.spaces);
     transfer.n_free = memory_array_zero(job->allocator, n_pieces, sizeof *transfer.n_free);
+    struct batches batches = {.n_pieces = n_pieces, .batch = BATCH, .to = TRANSFERRED, .doing = "strands were carried to the target"};
     int ready = transfer.spaces && transfer.n_free;
     for (uint32_t i = 0; ready && i < n_threads; i++)
         ready = smoothing_init(&transfer.spaces[i], longest, job->allocator);
-    if (ready) {
-        parallel_for(job->context, n_pieces, transfer_piece, &transfer);
-        for (uint32_t i = 0; i < n_pieces; i++)
-            job->report->n_smoothed += transfer.n_free[i];
-    }
+    groom_status st = ready ? batches_run(job->context, &batches, transfer_piece, &transfer, diag)
+                            : groom_fail(diag, GROOM_ENOMEM, "no memory for the initial transfer");
+    for (uint32_t i = 0; st == GROOM_OK && i < n_pieces; i++)
+        job->report->n_smoothed += transfer.n_free[i];
     for (uint32_t i = 0; transfer.spaces && i < n_threads; i++)
         smoothing_finish(&transfer.spaces[i], longest, job->allocator);
     memory_release(job->allocator, transfer.spaces, n_threads, sizeof *transfer.spaces);
     memory_release(job->allocator, transfer.n_free, n_pieces, sizeof *transfer.n_free);
-    return ready ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for the initial transfer");
+    return st;
 }
 
 double adaptive_weight(double arc, double travel, double sigma)

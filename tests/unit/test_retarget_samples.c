@@ -126,6 +126,36 @@ START_TEST(retargeting_to_oneself_changes_nothing)
 }
 END_TEST
 
+/* Hair as it came, some of it inside the head: clearance and no change contradict each other there, and only there. */
+START_TEST(to_oneself_only_what_is_inside_is_moved)
+{
+    static const groom_retarget_mode modes[] = {GROOM_RETARGET_MULTISCALE, GROOM_RETARGET_GLOBAL};
+    for (int mode = 0; mode < 2; mode++) {
+        struct scene s;
+        uint32_t n_same = 0;
+        scene_init(&s, GROOM_SAMPLE_CURLY, 500, 40, 1);
+        s.options.guides = 50;
+        s.options.mode = modes[mode];
+        points out = room_for(s.strands);
+        struct groom_retarget_report report = carry(s.strands, &s.self, &s.self, &s.options, NULL, out);
+        for (uint32_t i = 0; i < s.strands->n_strands; i++) {
+            uint32_t first = s.strands->first[i], n = s.strands->first[i + 1] - first;
+            n_same += memcmp(out + first, s.strands->points + first, n * sizeof *out) == 0;
+        }
+        ck_assert_uint_gt(report.inside_before.near_vertices, 20);
+        ck_assert_uint_gt(report.movement_others.strands, 250);
+        ck_assert_uint_eq(report.movement_conflict.strands + report.movement_others.strands, s.strands->n_strands);
+        ck_assert_uint_eq(report.n_unchanged, report.movement_others.strands);
+        ck_assert_uint_eq(n_same, report.n_unchanged);
+        ck_assert_double_le(report.movement_others.max, 7.85e-8);
+        ck_assert_double_gt(report.movement_conflict.mean, 1e-6);
+        assert_outside(s.strands, (const float(*)[3])out, s.body, s.options.clearance);
+        free(out);
+        scene_finish(&s);
+    }
+}
+END_TEST
+
 START_TEST(there_and_back_is_nearly_where_it_was)
 {
     struct scene s;
@@ -479,6 +509,7 @@ END_TEST
 struct stopper {
     uint32_t n_asked, stop_at;
     double last;
+    uint32_t n_told_early, n_told_late; /* during the initial transfer, the last pass */
 };
 
 static int stopped(void *user)
@@ -492,6 +523,8 @@ static void note(void *user, double fraction)
     struct stopper *stopper = user;
     ck_assert_double_ge(fraction, stopper->last);
     stopper->last = fraction;
+    stopper->n_told_early += fraction > 0 && fraction < 0.1;
+    stopper->n_told_late += fraction > 0.9 && fraction < 1;
 }
 
 /* Preparation and run, which either end well or leave nothing behind. */
@@ -507,6 +540,27 @@ static groom_status whole(const struct scene *s, const struct groom_context *con
     groom_retarget_source_destroy(source);
     return st;
 }
+
+/* What moves every strand asks every few thousand of them, and tells how far it is. */
+START_TEST(transfer_and_last_pass_ask_midway)
+{
+    struct scene s;
+    struct groom_retarget_source *source;
+    struct stopper stopper = {.stop_at = UINT32_MAX};
+    struct groom_progress progress = {.report = note, .cancelled = stopped, .user = &stopper};
+    struct groom_context context = {.progress = &progress};
+    scene_init(&s, GROOM_SAMPLE_SHORT, 9000, 3, 1);
+    s.options.iterations = 1;
+    points out = room_for(s.strands);
+    ck_ok(groom_retarget_source_create(s.strands, s.body, &s.skeleton, NULL, &s.options, NULL, &source, NULL));
+    ck_ok(groom_retarget_run(source, &s.target, &s.options, &context, out, NULL, NULL, NULL));
+    ck_assert_uint_ge(stopper.n_told_early, 4);
+    ck_assert_uint_ge(stopper.n_told_late, 4);
+    groom_retarget_source_destroy(source);
+    free(out);
+    scene_finish(&s);
+}
+END_TEST
 
 START_TEST(cancelled_whenever_it_asks)
 {
@@ -585,11 +639,12 @@ START_TEST(every_failing_allocation_of_a_groom_is_told)
 }
 END_TEST
 
-TEST_SUITE("retarget_samples", retargeting_to_oneself_changes_nothing, there_and_back_is_nearly_where_it_was,
+TEST_SUITE("retarget_samples", retargeting_to_oneself_changes_nothing, to_oneself_only_what_is_inside_is_moved,
+           there_and_back_is_nearly_where_it_was,
            what_is_inside_is_brought_out, roots_stay_on_the_surface, buried_roots_come_to_lie_on_the_surface, two_scales_come_near_the_global_solution,
            steps_come_as_low_as_the_iterations_of_the_paper, energies_of_steps_are_those_of_where_they_lead,
            same_bits_for_any_pool, weight_follows_equation_20, moved_roots_are_kept_and_tips_hardly_follow,
            a_procedural_groom_stays_procedural, a_groom_made_of_strands_has_them_carried,
            control_points_of_layers_go_with_the_head, what_cannot_be_is_refused,
-           particles_that_no_ray_reaches_go_with_the_surface, cancelled_whenever_it_asks,
+           particles_that_no_ray_reaches_go_with_the_surface, transfer_and_last_pass_ask_midway, cancelled_whenever_it_asks,
            every_failing_allocation_is_told, every_failing_allocation_of_a_groom_is_told)

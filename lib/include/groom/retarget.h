@@ -139,6 +139,12 @@ struct groom_retarget_inside {
     double deepest;               /* metres, of vertices; 0 where none is inside */
 };
 
+/* How far vertices went from where the initial transfer has them. */
+struct groom_retarget_movement {
+    uint32_t strands;
+    double mean, max; /* metres, of their vertices */
+};
+
 struct groom_retarget_report {
     uint32_t n_strands, n_guides;
     uint64_t n_vertices;
@@ -151,6 +157,10 @@ struct groom_retarget_report {
     struct groom_retarget_inside inside_before, inside_after;
     double length_ratio_min, length_ratio_median, length_ratio_max; /* of strands, result over source */
     double movement_mean, movement_max;                  /* of vertices from the initial transfer, metres */
+    /* The same of strands that it has inside or too near somewhere, and of all others. A strand that it leaves where it
+     * was (to 1e-6 m) and that keeps the clearance is unchanged to the bit, whatever its neighbours do. */
+    struct groom_retarget_movement movement_conflict, movement_others;
+    uint32_t n_unchanged;
     double seconds_initial, seconds_coarse, seconds_fine, seconds_whole, seconds_clearance, seconds_total;
 };
 
@@ -184,7 +194,8 @@ GROOM_MUST_CHECK groom_status groom_retarget_run(const struct groom_retarget_sou
 /* {"strands","vertices","guides","smoothed","without_bone","iterations_coarse","iterations_fine",
  *  "energy":{"before":{"shape","inter","body","total"},"after":...},
  *  "inside":{"before":{"vertices","segments","near_vertices","deepest"},"after":...},
- *  "length_ratio":{"min","median","max"},"movement":{"mean","max"},
+ *  "length_ratio":{"min","median","max"},
+ *  "movement":{"mean","max","in_conflict":{"strands","mean","max"},"others":{"strands","mean","max"}},"unchanged",
  *  "seconds":{"initial","coarse","fine","clearance","total"},"coarse":[{"energy","mean_movement"},...]}
  * malloc'd, for the caller to free(). */
 GROOM_MUST_CHECK groom_status groom_retarget_report_print(const struct groom_retarget_report *report, char **json,
