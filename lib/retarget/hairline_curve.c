@@ -156,7 +156,8 @@ groom_status curve_init(struct curve *curve, const struct groom_scalp_region *re
         return st;
     if (!(curve->length > 2 * STEP))
         return groom_fail_field(diag, GROOM_EINVAL, field, "the hairline has no length");
-    if (!line_crosses_itself(curve->u, curve->n, 0, &first, &second))
+    int closed = memcmp(drawn->points[0], drawn->points[drawn->n_points - 1], sizeof drawn->points[0]) == 0;
+    if (!line_crosses_itself((const double(*)[2])curve->u, curve->n - (uint32_t)closed, closed, &first, &second))
         return GROOM_OK;
     uint32_t at = drawn_before(curve, drawn, first), again = drawn_before(curve, drawn, second);
     snprintf(field, sizeof field, "%s/points/%u", pointer, at);
@@ -370,6 +371,16 @@ static double side_of(const double a[2], const double b[2], const double p[2])
 int segments_cross(const double a[2], const double b[2], const double c[2], const double d[2])
 {
     return side_of(a, b, c) * side_of(a, b, d) < 0 && side_of(c, d, a) * side_of(c, d, b) < 0;
+}
+
+int line_surrounds(const double (*line)[2], uint32_t n, const double p[2])
+{
+    int inside = 0;
+    for (uint32_t i = 0, j = n - 1; i < n; j = i++)
+        if ((line[i][1] > p[1]) != (line[j][1] > p[1]) &&
+            p[0] < line[i][0] + (p[1] - line[i][1]) * (line[j][0] - line[i][0]) / (line[j][1] - line[i][1]))
+            inside ^= 1;
+    return inside;
 }
 
 int line_crosses_itself(const double (*u)[2], uint32_t n, int closed, uint32_t *first, uint32_t *second)

@@ -16,7 +16,8 @@ struct curve {
     const struct groom_allocator *allocator;
 };
 
-/* Centripetal Catmull-Rom through the points, every two millimetres brought to the surface.
+/* Centripetal Catmull-Rom through the points, every two millimetres brought to the surface; closed where the last
+ * point is the first again.
  * pointer  of the curve in the hairline's JSON, "" or "/curves/1"
  * returns  GROOM_OK; GROOM_EINVAL: a point that leaves the head, a curve of no length, one that crosses
  *          itself; GROOM_ENOMEM; finish it in any case */
@@ -46,6 +47,8 @@ GROOM_MUST_CHECK groom_status curve_targets(const struct curve *curve, const str
 /* Whether segments p..p+1 of an open or closed line in the plane cross. first, second: two that do
  * returns  1 or 0 */
 int line_crosses_itself(const double (*u)[2], uint32_t n, int closed, uint32_t *first, uint32_t *second);
+/* Whether p is within a closed line, by the even-odd rule. */
+int line_surrounds(const double (*line)[2], uint32_t n, const double p[2]);
 int segments_cross(const double a[2], const double b[2], const double c[2], const double d[2]);
 
 #endif

@@ -117,7 +117,8 @@ static groom_status parse_curve(const cJSON *json, const char *parent, struct gr
 static groom_status parse_curves(const cJSON *curves, struct groom_hairline *hairline, struct groom_diag *diag)
 {
     static const char *const names[] = {"points", "turns"};
-    int most = hairline->kind == GROOM_HAIRLINE_SIDEBURNS ? GROOM_HAIRLINE_MAX_CURVES : 1;
+    int many = hairline->kind == GROOM_HAIRLINE_SIDEBURNS || hairline->kind == GROOM_HAIRLINE_CROWN;
+    int most = many ? GROOM_HAIRLINE_MAX_CURVES : 1;
     const cJSON *curve;
     if (!cJSON_IsArray(curves) || cJSON_GetArraySize(curves) < 1 || cJSON_GetArraySize(curves) > most)
         return groom_fail_field(diag, GROOM_EINVAL, "/curves", "%s takes a list of 1 to %d curves",

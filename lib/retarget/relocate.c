@@ -348,17 +348,6 @@ static double rest_area(const struct embedded *membrane)
 
 /* --- balding ----------------------------------------------------------------------------------------------------- */
 
-/* Even-odd rule. */
-static int inside_polygon(const double (*polygon)[2], uint32_t n, const double p[2])
-{
-    int inside = 0;
-    for (uint32_t i = 0, j = n - 1; i < n; j = i++)
-        if ((polygon[i][1] > p[1]) != (polygon[j][1] > p[1]) &&
-            p[0] < polygon[i][0] + (p[1] - polygon[i][1]) * (polygon[j][0] - polygon[i][0]) / (polygon[j][1] - polygon[i][1]))
-            inside ^= 1;
-    return inside;
-}
-
 /* Roots stay; those that the new boundary leaves outside are given up. */
 static void give_up(struct relocation *r, float (*out)[3], unsigned char *bald, struct groom_relocation_report *report)
 {
@@ -370,12 +359,62 @@ static void give_up(struct relocation *r, float (*out)[3], unsigned char *bald, 
         const struct groom_surface_point *host = &region->hosts[i];
         double u[2];
         int gone = scalp->local_triangle[host->triangle] != SURFACE_NONE && flat_parameters(&region->flat, host->triangle, host->barycentric, u) &&
-                   !inside_polygon((const double (*)[2])r->polygon, scalp->n_loop, u);
+                   !line_surrounds((const double (*)[2])r->polygon, scalp->n_loop, u);
         vec_store(root_of(region, i), out[i]);
         if (bald)
             bald[i] = (unsigned char)gone;
         report->n_bald += (uint32_t)gone;
     }
+}
+
+/* The drawn curve and a way back to where it began. */
+static groom_status close_curve(struct relocation *r, uint32_t c, struct groom_diag *diag)
+{
+    const struct groom_hairline_curve *drawn = &r->hairline->curves[c];
+    struct groom_hairline_curve *round = memory_array(r->allocator, 1, sizeof *round);
+    if (!round)
+        return no_memory(diag);
+    *round = *drawn;
+    if (drawn->n_points < GROOM_HAIRLINE_MAX_POINTS && drawn->n_points >= 3 &&
+        memcmp(drawn->points[0], drawn->points[drawn->n_points - 1], sizeof drawn->points[0]) != 0)
+        memcpy(round->points[round->n_points++], drawn->points[0], sizeof drawn->points[0]);
+    groom_status st = curve_init(&r->curves[c], r->region, round, r->pointers[c], diag);
+    memory_release(r->allocator, round, 1, sizeof *round);
+    return st;
+}
+
+/* Roots stay; those within closed curves are given up. */
+static groom_status give_up_within(struct relocation *r, float (*out)[3], unsigned char *bald, struct groom_relocation_report *report,
+                                   struct groom_diag *diag)
+{
+    const struct groom_scalp_region *region = r->region;
+    uint32_t n_within[GROOM_HAIRLINE_MAX_CURVES] = {0};
+    for (uint32_t c = 0; c < r->hairline->n_curves; c++) {
+        if (r->hairline->n_curves > 1)
+            snprintf(r->pointers[c], sizeof r->pointers[c], "/curves/%u", c);
+        groom_status st = close_curve(r, c, diag);
+        if (st != GROOM_OK)
+            return st;
+    }
+    for (uint32_t i = 0; i < region->n_roots; i++) {
+        const struct groom_surface_point *host = &region->hosts[i];
+        double u[2];
+        int gone = 0;
+        if (flat_parameters(&region->flat, host->triangle, host->barycentric, u))
+            for (uint32_t c = 0; c < r->hairline->n_curves; c++) {
+                int within = line_surrounds((const double (*)[2])r->curves[c].u, r->curves[c].n, u);
+                n_within[c] += (uint32_t)within;
+                gone |= within;
+            }
+        vec_store(root_of(region, i), out[i]);
+        if (bald)
+            bald[i] = (unsigned char)gone;
+        report->n_bald += (uint32_t)gone;
+    }
+    for (uint32_t c = 0; c < r->hairline->n_curves; c++)
+        if (n_within[c] == 0)
+            return groom_fail_field(diag, GROOM_EINVAL, r->pointers[c], "no hair grows within the closed curve");
+    return GROOM_OK;
 }
 
 /* --- all of it ------------------------------------------------------------------------------------------------------ */
@@ -384,6 +423,10 @@ static groom_status relocate(struct relocation *r, float (*out)[3], unsigned cha
                              struct groom_relocation_report *report, struct groom_diag *diag)
 {
     const struct sheet *scalp = &r->region->scalp;
+    for (uint32_t t = 0; density && t < scalp->n_triangles; t++)
+        density[t] = 0;
+    if (r->hairline->kind == GROOM_HAIRLINE_CROWN)
+        return give_up_within(r, out, bald, report, diag);
     for (uint32_t i = 0; i < scalp->n_loop; i++)
         r->given[scalp->loop[i]] = 1;
     groom_status st = lay_curves(r, diag);
@@ -395,8 +438,6 @@ static groom_status relocate(struct relocation *r, float (*out)[3], unsigned cha
         return st;
     if (r->hairline->kind == GROOM_HAIRLINE_BALDING) {
         give_up(r, out, bald, report);
-        for (uint32_t t = 0; density && t < scalp->n_triangles; t++)
-            density[t] = 0;
         return GROOM_OK;
     }
     st = place_scalp(r, diag);
@@ -416,7 +457,8 @@ static groom_status relocate(struct relocation *r, float (*out)[3], unsigned cha
 
 static groom_status check_request(const struct groom_hairline *hairline, struct groom_diag *diag)
 {
-    uint32_t most = hairline->kind == GROOM_HAIRLINE_SIDEBURNS ? GROOM_HAIRLINE_MAX_CURVES : 1;
+    int many = hairline->kind == GROOM_HAIRLINE_SIDEBURNS || hairline->kind == GROOM_HAIRLINE_CROWN;
+    uint32_t most = many ? GROOM_HAIRLINE_MAX_CURVES : 1;
     if ((unsigned)hairline->kind >= GROOM_HAIRLINE_KIND_COUNT || (unsigned)hairline->method >= GROOM_RELOCATE_COUNT)
         return groom_fail(diag, GROOM_EINVAL, "an edit of a kind or a method that is not known");
     if (hairline->n_curves < 1 || hairline->n_curves > most)

@@ -299,6 +299,13 @@ test('the hairline of a target is shown, moved, and the hair grows from there', 
   assert.equal(less.retarget.hairline.bald, n - less.strands.count);
   assert.equal(decode(less.retarget.strands.stretch).length, less.strands.count);
 
+  /** A ring about the top of the target's head. */
+  const ring = Array.from({ length: 12 }, (_, i) => [0.04 * Math.cos((Math.PI * i) / 6), CENTRE[1] + 0.95 * RADIUS * WIDE[1], 0.04 * Math.sin((Math.PI * i) / 6)]);
+  const crown = await carried(daemon, { strands: str, source: { head }, target: { head: target, hairline: { kind: 'crown', points: ring } }, options });
+  const tonsured = (await expect(daemon, 200, 'GET', `/v1/grooms/${crown.result.groom}`)).json;
+  assert.ok(tonsured.strands.count < n && tonsured.strands.count > n / 2, `${tonsured.strands.count} of ${n}`);
+  assert.equal(tonsured.retarget.hairline.bald, n - tonsured.strands.count);
+
   const whole = groom_document({ n, m: M, guides: 40, name: 'coil' });
   whole.guides.points = array('f32', [40, M, 3], strands(40).flat(2));
   whole.strands.roots = array('f32', [n, 3], strands(n).flatMap((strand) => strand[0]));

@@ -218,6 +218,7 @@ START_TEST(a_hairline_prints_as_what_reads_the_same)
     static const char *const texts[] = {
         "{\"points\":" POINTS "}",
         "{\"kind\":\"sideburns\",\"method\":\"harmonic\",\"curves\":[{\"points\":" POINTS "},{\"points\":" POINTS ",\"turns\":[{\"from\":0.3,\"to\":0.4}]}]}",
+        "{\"kind\":\"crown\",\"curves\":[{\"points\":" POINTS "},{\"points\":" POINTS "}]}",
         "{\"kind\":\"balding\",\"points\":" POINTS ",\"turns\":[{\"from\":0.25,\"to\":0.2},{\"from\":0.75,\"to\":0.8}]}",
     };
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
@@ -403,6 +404,77 @@ START_TEST(sideburns_move_their_side_alone)
 }
 END_TEST
 
+/* A ring on the head, the nearest points to one about `centre` across which `up` and x lead. */
+static void draw_ring(const double centre[3], const double up[3], double radius)
+{
+    struct groom_bvh *bvh;
+    hairline = (struct groom_hairline){.kind = GROOM_HAIRLINE_CROWN, .n_curves = 1, .curves[0].n_points = 16};
+    ck_ok(groom_bvh_create(head, NULL, &bvh, NULL));
+    for (uint32_t i = 0; i < 16; i++) {
+        struct groom_surface_point near;
+        float p[3];
+        for (int c = 0; c < 3; c++)
+            p[c] = (float)(centre[c] + radius * ((c == 0) * cos(i * M_PI / 8) + up[c] * sin(i * M_PI / 8)));
+        ck_assert(groom_bvh_closest(bvh, p, INFINITY, &near));
+        memcpy(hairline.curves[0].points[i], near.position, sizeof near.position);
+    }
+    groom_bvh_destroy(bvh);
+}
+
+/* Behind the top of the head. */
+static void draw_crown(void)
+{
+    double top[3] = {0, -INFINITY, -0.02};
+    for (uint32_t i = 0; i < head->n_vertices; i++)
+        top[1] = fmax(top[1], head->points[i][1]);
+    draw_ring(top, (const double[3]){0, 0, 1}, 0.035);
+}
+
+START_TEST(a_bald_crown_gives_up_what_lies_within_and_moves_nothing)
+{
+    set_up();
+    draw_crown();
+    relocate();
+    const float(*ring)[3] = (const float(*)[3])hairline.curves[0].points;
+    double centre[3] = {0};
+    uint32_t n_bald = 0;
+    for (uint32_t i = 0; i < 16; i++)
+        for (int c = 0; c < 3; c++)
+            centre[c] += ring[i][c] / 16;
+    for (uint32_t i = 0; i < N; i++) {
+        double beside = hypot(roots[i][0] - centre[0], roots[i][2] - centre[2]);
+        ck_assert_double_lt(distance(roots[i], moved[i]), 1e-5);
+        n_bald += bald[i];
+        if (roots[i][1] > centre[1] - 0.03 && fabs(beside - 0.035) > 0.012)
+            ck_assert_int_eq(bald[i], beside < 0.035);
+    }
+    ck_assert_uint_eq(n_bald, report.n_bald);
+    ck_assert_uint_gt(n_bald, N / 100);
+    ck_assert_uint_lt(n_bald, N / 4);
+    tear_down();
+}
+END_TEST
+
+START_TEST(a_crown_that_cannot_be_is_refused)
+{
+    struct groom_diag diag = {0};
+    float swapped[3], front[3][3];
+    set_up();
+    draw_crown();
+    float(*ring)[3] = hairline.curves[0].points;
+    memcpy(swapped, ring[2], sizeof swapped);
+    memcpy(ring[2], ring[10], sizeof swapped);
+    memcpy(ring[10], swapped, sizeof swapped);
+    ck_status(groom_hairline_relocate(region, &hairline, NULL, moved, bald, NULL, &report, &diag), GROOM_EINVAL);
+    ck_assert_ptr_nonnull(strstr(diag.detail, "crosses itself"));
+    groom_scalp_region_front(region, 3, front);
+    draw_ring((const double[3]){0, front[1][1] - 0.03, front[1][2] + 0.02}, (const double[3]){0, 1, 0}, 0.01); /* on the forehead */
+    ck_status(groom_hairline_relocate(region, &hairline, NULL, moved, bald, NULL, &report, &diag), GROOM_EINVAL);
+    ck_assert_ptr_nonnull(strstr(diag.detail, "no hair grows within"));
+    tear_down();
+}
+END_TEST
+
 START_TEST(balding_gives_up_what_lies_before_the_curve_and_moves_nothing)
 {
     set_up();
@@ -545,5 +617,6 @@ TEST_SUITE("hairline", gradient_and_hessian_are_the_energys_differences,
            the_same_edit_gives_the_same_bits_with_more_threads, a_curve_drawn_from_right_to_left_is_the_same_edit,
            turning_points_that_are_given_hold, sideburns_move_their_side_alone,
            balding_gives_up_what_lies_before_the_curve_and_moves_nothing,
+           a_bald_crown_gives_up_what_lies_within_and_moves_nothing, a_crown_that_cannot_be_is_refused,
            hairlines_that_cannot_be_are_refused_with_a_pointer, a_front_drawn_behind_the_back_is_refused,
            cancelling_stops_the_membrane, every_allocation_may_fail)

@@ -69,7 +69,8 @@ void groom_scalp_region_front(const struct groom_scalp_region *region, uint32_t 
 #define GROOM_HAIRLINE_KIND_LIST(X)                                                                  \
     X(GROOM_HAIRLINE_FRONT,     "front")     /* from ear to ear over the forehead */                  \
     X(GROOM_HAIRLINE_SIDEBURNS, "sideburns") /* between the boundary points nearest to its ends, the shorter way */ \
-    X(GROOM_HAIRLINE_BALDING,   "balding")   /* as front, and hair in front of the curve is not pushed together: see relocate */
+    X(GROOM_HAIRLINE_BALDING,   "balding")   /* as front, and hair in front of the curve is not pushed together: see relocate */ \
+    X(GROOM_HAIRLINE_CROWN,     "crown")     /* closed curves anywhere on the scalp, within which hair is given up */
 
 typedef enum groom_hairline_kind {
 #define GROOM_HAIRLINE_ENUM(constant, name) constant,
@@ -113,7 +114,7 @@ struct groom_hairline_curve {
 struct groom_hairline {
     groom_hairline_kind kind;
     groom_relocate_method method;
-    uint32_t n_curves; /* 1; sideburns: 1..GROOM_HAIRLINE_MAX_CURVES */
+    uint32_t n_curves; /* 1; sideburns and crown: 1..GROOM_HAIRLINE_MAX_CURVES */
     struct groom_hairline_curve curves[GROOM_HAIRLINE_MAX_CURVES];
 };
 
@@ -148,12 +149,14 @@ struct groom_relocation_report {
  * Balding: a receding line would push the hair behind it together; density is kept instead, by
  * leaving roots where they are and giving up those that the curve leaves outside (bald[i] = 1).
  *
+ * Crown: likewise for the hair within closed curves; the last point leads back to the first, the boundary stays.
+ *
  * roots_out  [n] of the roots that the region was made from, the caller's
  * bald       [n] 0 or 1, or NULL
  * density    [region triangles] relative change, for colouring, or NULL
  * report     may be NULL
  * returns    GROOM_OK; GROOM_EINVAL with a pointer: a curve that crosses itself or the boundary that
- *            is held, a point that leaves the head, ends that are not near the ears or the boundary,
+ *            is held, a point that leaves the head, a closed curve with no hair in it, ends that are not near the ears or the boundary,
  *            too few points; GROOM_EDEGENERATE where the scalp would fold; GROOM_ENOMEM, GROOM_ECANCELLED
  * threads    same bits for any pool */
 GROOM_MUST_CHECK groom_status groom_hairline_relocate(const struct groom_scalp_region *region,
