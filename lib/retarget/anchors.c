@@ -14,6 +14,7 @@
 #include "retarget/source.h"
 
 #define PIECE 2048            /* particles */
+#define ROOT_ANCHOR 0.02f /* metres: a root's anchor is nearer, unless nothing else is */
 #define BATCH 64              /* pieces between two looks at progress */
 #define FIELD_NODES 300000
 #define MOST_HITS 64
@@ -174,6 +175,30 @@ static void anchor_piece(void *user, uint32_t piece, uint32_t thread)
         search->without[piece] += !choose(search, strands->points[i], &search->source->anchors[i]);
 }
 
+/* Eq. 2 puts e^100 on a bone that points at the particle: straight above the head's bone an arm is preferred, a foot
+ * away, which may do for what hangs there. A root grows where it is: one whose anchor is far from it has the surface
+ * beside it. */
+static void seat_root(const struct search *search, uint32_t vertex)
+{
+    struct anchor *anchor = &search->source->anchors[vertex];
+    struct groom_surface_point near;
+    if (fabsf(anchor->eta) < ROOT_ANCHOR)
+        return;
+    double outside = field_signed(&search->field, search->source->strands->points[vertex], &near);
+    if (fabs(outside) < 0.5 * fabsf(anchor->eta))
+        *anchor = (struct anchor){.triangle = near.triangle, .v = near.barycentric[1], .w = near.barycentric[2],
+                                  .bone = ANCHOR_NO_BONE, .eta = (float)outside};
+}
+
+static void root_piece(void *user, uint32_t piece, uint32_t thread)
+{
+    const struct search *search = user;
+    const struct groom_strands *strands = search->source->strands;
+    (void)thread;
+    for (uint32_t i = piece * PIECE; i < strands->n_strands && i - piece * PIECE < PIECE; i++)
+        seat_root(search, strands->first[i]);
+}
+
 static groom_status search_all(struct search *search, const struct groom_context *context, struct groom_diag *diag)
 {
     struct batches batches = {.n_pieces = search->source->strands->n_vertices / PIECE + 1, .batch = BATCH, .to = 0.5,
@@ -181,6 +206,7 @@ static groom_status search_all(struct search *search, const struct groom_context
     groom_status st = batches_run(context, &batches, anchor_piece, search, diag);
     if (st != GROOM_OK)
         return st;
+    parallel_for(context, search->source->strands->n_strands / PIECE + 1, root_piece, search);
     for (uint32_t i = 0; i < batches.n_pieces; i++)
         search->source->n_without_bone += search->without[i];
     return GROOM_OK;

@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #define STORE_MAGIC "GROOMRTG"
-#define STORE_VERSION 1
+#define STORE_VERSION 2
 
 struct store_header {
     char magic[8];

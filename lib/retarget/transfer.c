@@ -50,7 +50,7 @@ void transfer_root(const struct job *job, uint32_t vertex, double out[3])
 {
     const struct anchor *anchor = &job->source->anchors[vertex];
     transfer_anchor(job, vertex, out);
-    if (anchor->bone == ANCHOR_NO_BONE || anchor->eta > -ROOT_DEPTH)
+    if (anchor->eta > -ROOT_DEPTH)
         return;
     struct vec q = surface_point(job->target->body, anchor);
     out[0] = q.x, out[1] = q.y, out[2] = q.z;

@@ -223,6 +223,56 @@ START_TEST(roots_stay_on_the_surface)
 }
 END_TEST
 
+/* The head, and a small one in place of an arm beside it. */
+static struct groom_mesh *with_arm(const struct groom_mesh *head, const float at[3], float size)
+{
+    struct groom_mesh *both;
+    ck_ok(groom_mesh_create(2 * head->n_vertices, 2 * head->n_triangles, 0, NULL, &both, NULL));
+    for (uint32_t i = 0; i < head->n_vertices; i++)
+        for (int c = 0; c < 3; c++) {
+            both->points[i][c] = head->points[i][c];
+            both->points[head->n_vertices + i][c] = at[c] + size * (head->points[i][c] - (c == 1 ? 1.6f : 0));
+        }
+    for (uint32_t t = 0; t < head->n_triangles; t++)
+        for (int c = 0; c < 3; c++) {
+            both->triangles[t][c] = head->triangles[t][c];
+            both->triangles[head->n_triangles + t][c] = head->n_vertices + head->triangles[t][c];
+        }
+    return both;
+}
+
+/* Eq. 2 prefers an arm's bone, square to the way there, to the head's, which points at the crown. */
+START_TEST(roots_on_the_crown_stay_on_the_head_beside_an_arm)
+{
+    struct scene s;
+    struct groom_bvh *bvh;
+    struct groom_retarget_source *source;
+    scene_init(&s, GROOM_SAMPLE_SHORT, 400, 8, 1);
+    struct groom_mesh *body = with_arm(s.body, (const float[3]){0.4f, 1.7f, 0}, 0.3f), *other = bodies_reshaped(body, 1);
+    struct groom_skeleton skeleton = {2, {{"head", {0, 1.58f, 0}, {0, 1.7f, 0}}, {"arm", {0.4f, 1.7f, -0.03f}, {0.4f, 1.7f, 0.03f}}}}, carried;
+    uint32_t n_arm = 0;
+    ck_ok(groom_skeleton_carry(&skeleton, body, other, &carried, NULL));
+    uint32_t *anywhere = calloc(body->n_triangles, sizeof *anywhere);
+    memset(anywhere, 0xff, body->n_triangles * sizeof *anywhere);
+    ck_ok(groom_retarget_source_create(s.strands, body, &skeleton, anywhere, &s.options, NULL, &source, NULL));
+    for (uint32_t i = 0; i < s.strands->n_vertices; i++)
+        n_arm += source->anchors[i].bone == 1;
+    ck_assert_uint_gt(n_arm, 10);
+    struct groom_retarget_target target = {other, &carried, NULL};
+    points out = room_for(s.strands);
+    ck_ok(groom_retarget_run(source, &target, &s.options, NULL, out, NULL, NULL, NULL));
+    ck_ok(groom_bvh_create(other, NULL, &bvh, NULL));
+    for (uint32_t i = 0; i < s.strands->n_strands; i++)
+        ck_assert_double_le(fabs(groom_bvh_signed_distance(bvh, out[s.strands->first[i]])), 1.5e-4);
+    groom_bvh_destroy(bvh);
+    groom_retarget_source_destroy(source);
+    groom_mesh_destroy(body);
+    groom_mesh_destroy(other);
+    free(anywhere), free(out);
+    scene_finish(&s);
+}
+END_TEST
+
 START_TEST(buried_roots_come_to_lie_on_the_surface)
 {
     struct scene s;
@@ -641,7 +691,8 @@ END_TEST
 
 TEST_SUITE("retarget_samples", retargeting_to_oneself_changes_nothing, to_oneself_only_what_is_inside_is_moved,
            there_and_back_is_nearly_where_it_was,
-           what_is_inside_is_brought_out, roots_stay_on_the_surface, buried_roots_come_to_lie_on_the_surface, two_scales_come_near_the_global_solution,
+           what_is_inside_is_brought_out, roots_stay_on_the_surface, roots_on_the_crown_stay_on_the_head_beside_an_arm,
+           buried_roots_come_to_lie_on_the_surface, two_scales_come_near_the_global_solution,
            steps_come_as_low_as_the_iterations_of_the_paper, energies_of_steps_are_those_of_where_they_lead,
            same_bits_for_any_pool, weight_follows_equation_20, moved_roots_are_kept_and_tips_hardly_follow,
            a_procedural_groom_stays_procedural, a_groom_made_of_strands_has_them_carried,
