@@ -47,6 +47,7 @@ static void apply(const struct random_search *search, struct random_search_memor
                   struct bundle x, struct bundle y)
 {
     groom_operator_type type = search->plan.groom->operators[search->plan.active[active]].type;
+    x.fallen = NULL; /* operators may be left out, or changed */
     kernel_of(type)->forward[search->plan.variant](&memory->in[active], x, y, memory->w.scratch);
 }
 
@@ -107,7 +108,7 @@ static const lanes *finish(const struct random_search *search, struct random_sea
             continue;
         struct bundle y = workspace_state(&memory->w, spare);
         if (a + 1 == n)
-            y.at = NULL;
+            y.at = y.fallen = NULL;
         apply(search, memory, a, x, y);
         x = y;
         spare = spare == n + 1 ? n + 2 : n + 1;

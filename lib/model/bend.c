@@ -51,21 +51,14 @@ LANES_INLINE void bend_measure(const struct kernel_inputs *in, const lanes *rest
         FOR_LANES(l) bend->axis[c][l] = bend->cosine[l] * in->axis[c][l] + bend->sine[l] * in->axis[3 + c][l];
 }
 
-/* How far each segment has turned: sum of l zeta' up to and with it, and 1 / that of all. What is bent is
- * as long as before: at_y = at. */
-LANES_INLINE vec bend_sums(const struct kernel_inputs *in, const lanes *restrict at, lanes *restrict at_y,
-                           lanes *restrict bent)
+/* How far each segment has turned: sum of l zeta' up to and with it, and 1 / that of all. */
+LANES_INLINE vec bend_sums(uint32_t m, float rise, const lanes *restrict at, const lanes *restrict fallen, lanes *restrict bent)
 {
-    struct beginning beginning = beginning_of(in->parameter[START], vec_inverse(vec_load(at[in->m - 1])));
     vec sum = {0}, before = {0};
-    if (at_y)
-        vec_store(at_y[0], before);
-    for (uint32_t j = 1; j < in->m; j++) {
+    for (uint32_t j = 1; j < m; j++) {
         vec s = vec_load(at[j]);
-        sum += (s - before) * vec_begun(&beginning, s);
+        sum += (s - before) * vec_begun(rise, vec_load(fallen[j]));
         vec_store(bent[j], sum);
-        if (at_y)
-            vec_store(at_y[j], s);
         before = s;
     }
     return vec_inverse(sum);
@@ -103,11 +96,15 @@ LANES_INLINE void bend_turn(uint32_t m, const vec a[3], const lanes *restrict si
     }
 }
 
+/* What is bent is as long as before, vertex by vertex. */
 LANES_INLINE void bend_forward(const struct kernel_inputs *in, struct bundle x, struct bundle y, lanes *scratch)
 {
     lanes *bent = scratch, *sine = scratch + in->m, *cosine = scratch + 2 * in->m;
+    lanes *fallen = y.fallen ? y.fallen : scratch + 3 * in->m;
     float angle = in->parameter[ANGLE] * HALVES_IN_RADIAN;
-    vec rate = angle * bend_sums(in, (const lanes *)x.at, y.at, bent), s, c, a[3];
+    vec_fall(in->m, (const lanes *)x.at, fallen);
+    vec rate = angle * bend_sums(in->m, lane_rise(in->parameter[START]), (const lanes *)x.at, (const lanes *)fallen, bent);
+    vec s, c, a[3];
     if (fabsf(angle) < 0.49f)
         bend_angles(in->m, 1, rate, (const lanes *)bent, sine, cosine);
     else
@@ -116,6 +113,8 @@ LANES_INLINE void bend_forward(const struct kernel_inputs *in, struct bundle x, 
     for (int k = 0; k < 3; k++)
         a[k] = c * vec_load(in->axis[k]) + s * vec_load(in->axis[3 + k]);
     bend_turn(in->m, a, (const lanes *)sine, (const lanes *)cosine, (const lanes *)x.points, y.points);
+    if (y.at)
+        memcpy(y.at, x.at, in->m * sizeof *y.at);
 }
 
 /* Tip to root through the rotations. d leaves with the adjoint of segment j in vertex j + 1 and that

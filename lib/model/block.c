@@ -31,32 +31,47 @@ static void blend_of(const struct groom *groom, const float *relative, const uin
 
 #define WIDE 3 /* quads at a time: an address a guide serves them all, and coordinates come round in step */
 
-/* Number i and on of lane l: `wide` quads, each into its row l. */
-LANES_INLINE void blend_lane(const struct blend *blend, uint32_t k, uint32_t l, uint32_t i, uint32_t wide, quad r[WIDE][QUAD])
+/* Where the guides of four lanes stand, from some number on. */
+struct blend_rows {
+    const float *at[QUAD][MOST_BLENDED];
+};
+
+/* The q-th quad from there on of lane l. No loop: the sum is a register. */
+LANES_INLINE quad blend_lane(const struct blend *blend, const struct blend_rows *row, uint32_t k, uint32_t l, uint32_t q)
 {
-    const float *guide = blend->guide[l][0] + i;
-    for (uint32_t q = 0; q < wide; q++)
-        r[q][l] = blend->weight[l][0] * quad_load(guide + QUAD * q);
-    for (uint32_t a = 1; a < k; a++) {
-        guide = blend->guide[l][a] + i;
-        for (uint32_t q = 0; q < wide; q++)
-            r[q][l] += blend->weight[l][a] * quad_load(guide + QUAD * q);
-    }
+    quad sum = blend->weight[l][0] * quad_load(row->at[l][0] + QUAD * q);
+    if (k > 1)
+        sum += blend->weight[l][1] * quad_load(row->at[l][1] + QUAD * q);
+    if (k > 2)
+        sum += blend->weight[l][2] * quad_load(row->at[l][2] + QUAD * q);
+    if (k > 3)
+        sum += blend->weight[l][3] * quad_load(row->at[l][3] + QUAD * q);
+    return sum;
 }
 
-LANES_INLINE void blend_lines(const struct blend *blend, uint32_t k, uint32_t i, uint32_t wide, int add, quad factor,
-                              lanes *restrict x)
+LANES_INLINE void blend_quad(const struct blend *blend, const struct blend_rows *row, uint32_t k, uint32_t q, int add,
+                             quad factor, lanes *restrict x)
 {
-    quad r[WIDE][QUAD];
-    blend_lane(blend, k, 0, i, wide, r), blend_lane(blend, k, 1, i, wide, r);
-    blend_lane(blend, k, 2, i, wide, r), blend_lane(blend, k, 3, i, wide, r);
-    for (uint32_t q = 0; q < wide; q++) {
-        quad_transpose(r[q]);
-        for (uint32_t t = 0; t < QUAD; t++) {
-            float *line = x[i + QUAD * q + t];
-            quad_store(line, factor * (add ? quad_load(line) + r[q][t] : r[q][t]));
-        }
-    }
+    quad r[QUAD] = {blend_lane(blend, row, k, 0, q), blend_lane(blend, row, k, 1, q), blend_lane(blend, row, k, 2, q),
+                    blend_lane(blend, row, k, 3, q)};
+    quad_transpose(r);
+    for (uint32_t t = 0; t < QUAD; t++)
+        quad_store(x[QUAD * q + t], factor * (add ? quad_load(x[QUAD * q + t]) + r[t] : r[t]));
+}
+
+/* Numbers i and on; as whole addresses, to which a quad's offset is then a part of the load. */
+LANES_INLINE void blend_some_quads(const struct blend *blend, uint32_t k, uint32_t i, uint32_t n_quads, int add,
+                                   quad factor, lanes *restrict x)
+{
+    struct blend_rows row;
+    for (uint32_t l = 0; l < QUAD; l++)
+        for (uint32_t a = 0; a < k; a++)
+            row.at[l][a] = (const float *)((uintptr_t)blend->guide[l][a] + i * sizeof(float));
+    blend_quad(blend, &row, k, 0, add, factor, x + i);
+    if (n_quads == 1)
+        return;
+    blend_quad(blend, &row, k, 1, add, factor, x + i);
+    blend_quad(blend, &row, k, 2, add, factor, x + i);
 }
 
 /* x = factor ([x +] sum over k guides of weight guide), of four lanes. */
@@ -64,9 +79,9 @@ LANES_INLINE void blend_quads(const struct blend *blend, uint32_t k, uint32_t n,
 {
     uint32_t i = 0;
     for (; i + WIDE * QUAD <= n; i += WIDE * QUAD)
-        blend_lines(blend, k, i, WIDE, add, factor, x);
+        blend_some_quads(blend, k, i, WIDE, add, factor, x);
     for (; i + QUAD <= n; i += QUAD)
-        blend_lines(blend, k, i, 1, add, factor, x);
+        blend_some_quads(blend, k, i, 1, add, factor, x);
     for (; i < n; i++)
         for (uint32_t l = 0; l < QUAD; l++) {
             float sum = blend->weight[l][0][0] * blend->guide[l][0][i];
@@ -76,7 +91,7 @@ LANES_INLINE void blend_quads(const struct blend *blend, uint32_t k, uint32_t n,
         }
 }
 
-/* Bodies for each number of guides, which stay in registers. */
+/* Bodies for each number of guides. */
 static void blend_some(const struct blend *blend, uint32_t k, uint32_t n, int add, quad factor, lanes *x)
 {
     if (add)

@@ -25,15 +25,13 @@ LANES_INLINE void turning(const struct kernel_inputs *in, float *restrict rate, 
 }
 
 /* zeta' rho': how far each vertex is moved. */
-LANES_INLINE void curl_sizes(const struct kernel_inputs *in, const lanes *restrict at, lanes *restrict size)
+LANES_INLINE void curl_sizes(const struct kernel_inputs *in, const lanes *restrict at, const lanes *restrict fallen,
+                             lanes *restrict size)
 {
-    vec inverse = vec_inverse(vec_load(at[in->m - 1])), growth = in->parameter[RADIUS] * RADIUS_GROWTH * inverse;
-    struct beginning beginning = beginning_of(in->parameter[START], inverse);
-    float at_root = in->parameter[RADIUS] * RADIUS_AT_ROOT;
-    for (uint32_t j = 1; j < in->m; j++) {
-        vec s = vec_load(at[j]);
-        vec_store(size[j], (at_root + growth * s) * vec_begun(&beginning, s));
-    }
+    vec growth = in->parameter[RADIUS] * RADIUS_GROWTH * vec_inverse(vec_load(at[in->m - 1]));
+    float at_root = in->parameter[RADIUS] * RADIUS_AT_ROOT, rise = lane_rise(in->parameter[START]);
+    for (uint32_t j = 1; j < in->m; j++)
+        vec_store(size[j], (at_root + growth * vec_load(at[j])) * vec_begun(rise, vec_load(fallen[j])));
 }
 
 LANES_INLINE void curl_vertices(const struct kernel_inputs *in, const lanes *restrict size, const lanes *restrict x,
@@ -56,8 +54,13 @@ LANES_INLINE void curl_vertices(const struct kernel_inputs *in, const lanes *res
 
 LANES_INLINE void curl_forward(const struct kernel_inputs *in, struct bundle x, struct bundle y, lanes *scratch)
 {
-    curl_sizes(in, (const lanes *)x.at, scratch);
-    curl_vertices(in, (const lanes *)scratch, (const lanes *)x.points, (const lanes *)x.at, y.points);
+    lanes *size = scratch, *fallen = x.fallen;
+    if (!fallen) {
+        fallen = scratch + in->m;
+        vec_fall(in->m, (const lanes *)x.at, fallen);
+    }
+    curl_sizes(in, (const lanes *)x.at, (const lanes *)fallen, size);
+    curl_vertices(in, (const lanes *)size, (const lanes *)x.points, (const lanes *)x.at, y.points);
     if (y.at)
         vec_measure(in->m, (const lanes *)y.points, y.at);
 }

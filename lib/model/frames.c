@@ -65,7 +65,7 @@ struct curl_frame {
     double inverse_level;  /* 1 / |(tau.x, tau.y)|, 0 near +-z */
 };
 
-static struct curl_frame curl_frame_at(const float (*guide)[3], uint32_t m, uint32_t j)
+LANES_INLINE struct curl_frame curl_frame_at(const float (*guide)[3], uint32_t m, uint32_t j)
 {
     struct curl_frame f;
     uint32_t from, to;

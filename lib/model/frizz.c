@@ -37,10 +37,7 @@ LANES_INLINE struct noise_place noise_place_of(const float (*table)[QUAD], vec c
     place.f = pieces - vec_floor(pieces, &piece);
     piece *= (int)sizeof *table; /* bytes, for all lanes at once */
 #define CUBIC(l) place.cubic[l] = (const float(*)[QUAD])((const char *)table + piece[l])
-    CUBIC(0), CUBIC(1), CUBIC(2), CUBIC(3);
-#if LANES == 2 * QUAD
-    CUBIC(4), CUBIC(5), CUBIC(6), CUBIC(7);
-#endif
+    CUBIC(0), CUBIC(1), CUBIC(2), CUBIC(3), CUBIC(4), CUBIC(5), CUBIC(6), CUBIC(7); /* no loop: registers */
 #undef CUBIC
     return place;
 }

@@ -33,6 +33,7 @@ struct kernel_adjoints {
 struct bundle {
     lanes *points; /* [3m] */
     lanes *at;     /* [m] arc length from the root to each vertex; NULL where nobody asks */
+    lanes *fallen; /* [m] model/vec.h; NULL where nobody asks, or, in what an operator is given, has made it */
 };
 
 /* y = operator(x); x is measured. scratch: [KERNEL_SCRATCH(m)]; all distinct. */

@@ -11,11 +11,8 @@
 #include <math.h>
 #include <stdint.h>
 
-#ifdef __wasm__
-#define LANES 4 /* one vector: no loop is left within a line of a block */
-#else
+/* One vector of AVX2; two of WebAssembly's, whose chains of results are waited for side by side. */
 #define LANES 8
-#endif
 
 /* One number of each strand of a block. Arrays of a block are [..][LANES]; a block's points are
  * lanes x[3 * m], coordinate c of vertex j in x[3 * j + c], relative to the strand's root. */
@@ -97,6 +94,9 @@ LANES_INLINE float lane_begun(float v, float start)
 {
     return 1.0f / (1.0f + lane_exp2((START_STEEPNESS * LOG2_E) * (start - v)));
 }
+
+/* e^(10 start): what the kernels that keep e^(-10 v) need besides. start is 0 to 1. */
+LANES_INLINE float lane_rise(float start) { return lane_exp2((START_STEEPNESS * LOG2_E) * start); }
 
 /* Turns, and waves of the noise, beyond which a float no longer tells where in the turn it is. */
 #define MANY_TURNS 0x1p20f

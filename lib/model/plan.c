@@ -141,7 +141,7 @@ void plan_finish(struct plan *plan)
 groom_status workspace_init(struct workspace *w, uint32_t m, uint32_t n_states,
                             const struct groom_allocator *allocator)
 {
-    size_t points = (size_t)3 * m, n[6] = {points, n_states * (points + m), points, (size_t)FRAME_WIDTH * m, AXIS_WIDTH,
+    size_t points = (size_t)3 * m, n[6] = {points, n_states * (points + 2 * m), points, (size_t)FRAME_WIDTH * m, AXIS_WIDTH,
                                            KERNEL_SCRATCH(m)};
     *w = (struct workspace){.m = m, .n_states = n_states};
     for (int i = 0; i < 6; i++)
@@ -228,8 +228,8 @@ static void load_base(const struct plan *plan, const struct block *block, struct
 
 struct bundle workspace_state(const struct workspace *w, uint32_t i)
 {
-    lanes *points = w->state + (size_t)4 * w->m * i;
-    return (struct bundle){.points = points, .at = points + (size_t)3 * w->m};
+    lanes *points = w->state + (size_t)5 * w->m * i;
+    return (struct bundle){.points = points, .at = points + (size_t)3 * w->m, .fallen = points + (size_t)4 * w->m};
 }
 
 struct kernel_inputs plan_inputs(const struct plan *plan, const struct block *block, const struct workspace *w,
@@ -245,6 +245,11 @@ struct kernel_inputs plan_inputs(const struct plan *plan, const struct block *bl
                 op->random[r][groom_operator_random_per_guide(op->type) ? plan->groom->operator_guide_of[strand] : strand];
         }
     return in;
+}
+
+static groom_operator_type type_of(const struct plan *plan, uint32_t a)
+{
+    return plan->groom->operators[plan->active[a]].type;
 }
 
 /* What all begins with; factor: of block_instance. */
@@ -274,7 +279,7 @@ void plan_load(const struct plan *plan, const struct block *block, struct worksp
 
 static int begins_with_scale(const struct plan *plan)
 {
-    return plan->n_active > 0 && plan->groom->operators[plan->active[0]].type == GROOM_OPERATOR_SCALE;
+    return plan->n_active > 0 && type_of(plan, 0) == GROOM_OPERATOR_SCALE;
 }
 
 uint32_t plan_load_scaled(const struct plan *plan, const struct block *block, struct workspace *w)
@@ -296,8 +301,9 @@ void plan_apply(const struct plan *plan, const struct block *block, struct works
                 struct bundle y)
 {
     struct kernel_inputs in = plan_inputs(plan, block, w, a);
-    const struct groom_operator *op = &plan->groom->operators[plan->active[a]];
+    if (a == 0 || type_of(plan, a - 1) != GROOM_OPERATOR_BEND)
+        x.fallen = NULL;
     if (a + 1 == plan->n_active)
-        y.at = NULL;
-    kernel_of(op->type)->forward[plan->variant](&in, x, y, w->scratch);
+        y.at = y.fallen = NULL;
+    kernel_of(type_of(plan, a))->forward[plan->variant](&in, x, y, w->scratch);
 }

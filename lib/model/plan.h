@@ -31,7 +31,7 @@ void plan_finish(struct plan *plan);
 struct workspace {
     uint32_t m, n_states;
     float *rows;              /* [LANES][3m]; where the groom has a base */
-    lanes *state;             /* [n_states][4m] the block before and after operators: workspace_state */
+    lanes *state;             /* [n_states][5m] the block before and after operators: workspace_state */
     lanes *guide;             /* [3m]; with frame and axis, as in kernel_inputs */
     lanes *frame;             /* [FRAME_WIDTH * m] */
     lanes *axis;              /* [AXIS_WIDTH] */
@@ -47,7 +47,7 @@ GROOM_MUST_CHECK groom_status workspace_init(struct workspace *workspace, uint32
                                              const struct groom_allocator *allocator);
 void workspace_finish(struct workspace *workspace, const struct groom_allocator *allocator); /* takes zeroes */
 
-/* The points of state i, and room for their arc lengths. */
+/* The points of state i, and room for what bundles carry with them. */
 struct bundle workspace_state(const struct workspace *workspace, uint32_t i);
 
 /* Instance the block into state 0, measure it and bring its operator guides into the lanes. */

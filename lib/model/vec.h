@@ -80,32 +80,25 @@ LANES_INLINE vec vec_floor(vec t, ivec *whole)
 
 #endif
 
-/* Rows of four floats, one a lane, `skip` rows further: side by side, number k of each in c[k]. */
-#if LANES == QUAD
-LANES_INLINE void vec_fours(const float (*const row[LANES])[QUAD], uint32_t skip, vec c[QUAD])
-{
-    c[0] = quad_load(row[0][skip]), c[1] = quad_load(row[1][skip]);
-    c[2] = quad_load(row[2][skip]), c[3] = quad_load(row[3][skip]);
-    quad_transpose(c);
-}
-#else
 LANES_INLINE vec vec_two(const float *first, const float *second)
 {
     return __builtin_shufflevector(quad_load(first), quad_load(second), 0, 1, 2, 3, 4, 5, 6, 7);
 }
 
+/* Rows of four floats, one a lane, `skip` rows further: side by side, number k of each in c[k]. */
 LANES_INLINE void vec_fours(const float (*const row[LANES])[QUAD], uint32_t skip, vec c[QUAD])
 {
     vec q = vec_two(row[0][skip], row[4][skip]), r = vec_two(row[1][skip], row[5][skip]);
     vec s = vec_two(row[2][skip], row[6][skip]), t = vec_two(row[3][skip], row[7][skip]);
-    vec qr = __builtin_shufflevector(q, r, 0, 8, 1, 9, 4, 12, 5, 13), qr_high = __builtin_shufflevector(q, r, 2, 10, 3, 11, 6, 14, 7, 15);
-    vec st = __builtin_shufflevector(s, t, 0, 8, 1, 9, 4, 12, 5, 13), st_high = __builtin_shufflevector(s, t, 2, 10, 3, 11, 6, 14, 7, 15);
+    vec qr = __builtin_shufflevector(q, r, 0, 8, 1, 9, 4, 12, 5, 13);
+    vec qr_high = __builtin_shufflevector(q, r, 2, 10, 3, 11, 6, 14, 7, 15);
+    vec st = __builtin_shufflevector(s, t, 0, 8, 1, 9, 4, 12, 5, 13);
+    vec st_high = __builtin_shufflevector(s, t, 2, 10, 3, 11, 6, 14, 7, 15);
     c[0] = __builtin_shufflevector(qr, st, 0, 1, 8, 9, 4, 5, 12, 13);
     c[1] = __builtin_shufflevector(qr, st, 2, 3, 10, 11, 6, 7, 14, 15);
     c[2] = __builtin_shufflevector(qr_high, st_high, 0, 1, 8, 9, 4, 5, 12, 13);
     c[3] = __builtin_shufflevector(qr_high, st_high, 2, 3, 10, 11, 6, 7, 14, 15);
 }
-#endif
 
 /* --- the functions of model/lanes.h and model/noise.h ---------------------------------------- */
 
@@ -124,23 +117,16 @@ LANES_INLINE vec vec_exp2_near(vec x)
 
 LANES_INLINE vec vec_exp2(vec x) { return vec_exp2_near(vec_at_least(x, -126.0f)); }
 
-/* zeta' along strands: what is the same for all vertices of one. start is 0 to 1. */
-struct beginning {
-    vec slope;
-    float at_root;
-};
-
-LANES_INLINE struct beginning beginning_of(float start, vec inverse_length)
+/* zeta' in two steps, of which the first serves all operators on the same strands:
+ * fallen[j] = e^(-10 v_j), then 1 / (1 + e^(10 start) fallen). */
+LANES_INLINE void vec_fall(uint32_t m, const lanes *restrict at, lanes *restrict fallen)
 {
-    const float steep = START_STEEPNESS * LOG2_E;
-    return (struct beginning){.slope = steep * inverse_length, .at_root = steep * start};
+    vec slope = (-START_STEEPNESS * LOG2_E) * vec_inverse(vec_load(at[m - 1]));
+    for (uint32_t j = 0; j < m; j++)
+        vec_store(fallen[j], vec_exp2_near(slope * vec_load(at[j])));
 }
 
-/* zeta' at arc length s. */
-LANES_INLINE vec vec_begun(const struct beginning *beginning, vec s)
-{
-    return 1.0f / (1.0f + vec_exp2_near(beginning->at_root - beginning->slope * s));
-}
+LANES_INLINE vec vec_begun(float rise, vec fallen) { return 1.0f / (1.0f + rise * fallen); }
 
 /* Of pi halves, |halves| up to 1/2; then up to twice MANY_TURNS. */
 LANES_INLINE void vec_sincos_near(vec halves, vec *sine, vec *cosine)

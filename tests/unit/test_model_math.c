@@ -51,15 +51,17 @@ START_TEST(sincos_is_within_two_parts_in_ten_million)
 }
 END_TEST
 
-/* The same formulas with what a strand's vertices share taken out, or without the steps that do nothing there. */
+/* The same formulas in steps of which one is shared, or without steps that do nothing there. */
 START_TEST(short_forms_agree_with_long_ones)
 {
+    lanes at[3], fallen[3];
     for (int i = 0; i <= 1000; i++) {
         lanes begun, sine, cosine, wanted_sine, wanted_cosine;
         float length = 0.01f + 1e-3f * (float)i, v = 1e-3f * (float)i, halves = 0.49f * (2.0f * v - 1.0f);
-        struct beginning beginning = beginning_of(0.4f, vec_of(1.0f / length));
         vec s, c;
-        vec_store(begun, vec_begun(&beginning, vec_of(v * length)));
+        vec_store(at[0], vec_of(0.0f)), vec_store(at[1], vec_of(v * length)), vec_store(at[2], vec_of(length));
+        vec_fall(3, (const lanes *)at, fallen);
+        vec_store(begun, vec_begun(lane_rise(0.4f), vec_load(fallen[1])));
         ck_assert_double_lt(fabs(begun[0] - 1.0 / (1.0 + exp(-10.0 * ((double)v - 0.4f)))), 5e-7);
         vec_sincos_near(vec_of(halves), &s, &c);
         vec_store(sine, s), vec_store(cosine, c);
