@@ -1,6 +1,6 @@
 // Wrong usage and wrong files: the exit status, and a way out in words.
 import assert from 'node:assert/strict';
-import { readdirSync, writeFileSync } from 'node:fs';
+import { readFileSync, readdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 
@@ -59,6 +59,22 @@ test('a wrong unit is pointed out', options, async (t) => {
   const { status, stderr } = await groomctl(daemon, ['upload', path, '--unit', 'mm']);
   assert.equal(status, 0, stderr);
   assert.match(stderr, /hint: .*--unit m/);
+});
+
+test('a head in another unit than its strands is pointed out, and the fit says which it is in', options, async (t) => {
+  const daemon = await startDaemon(t), folder = temporaryFolder(t), path = (name) => join(folder, name);
+  await groomctl(daemon, ['sample', '-o', folder, '--strands', '400', '--vertices', '24', '--guides', '20']);
+  const grown = readFileSync(path('head.obj'), 'utf8').replace(/^v (\S+) (\S+) (\S+)/gm, (_, ...xyz) => `v ${xyz.slice(0, 3).map((x) => 100 * x).join(' ')}`);
+  writeFileSync(path('head_cm.obj'), grown);
+  const fit = (...more) => groomctl(daemon, ['fit', path('strands.hair'), '--head-file', path('head_cm.obj'), '--quality', 'draft', '--guides', '20', '-o', path('out.usda'), ...more]);
+  const wrong = await fit();
+  assert.notEqual(wrong.status, 0);
+  assert.match(wrong.stderr, /hint: the mesh is [\d.]+ m across in the unit given; in cm it would be 0\.\d+ m\. .*--unit cm/);
+  assert.match(wrong.stderr, /hint: the hair is [\d.]+ m across and the head [\d.]+ m: was one of them given another unit\?/);
+  assert.match(wrong.stderr, /the head is not in the strands' unit and axis: .* but 100 % would if it were 100 times smaller/);
+  const right = await fit('--head-unit', 'cm');
+  assert.equal(right.status, 0, right.stderr);
+  assert.doesNotMatch(right.stderr, /hint:/);
 });
 
 test('refusals of the server name the field and the way out', options, async (t) => {

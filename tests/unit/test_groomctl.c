@@ -200,6 +200,8 @@ START_TEST(a_wrong_unit_is_guessed_from_the_size)
     ck_assert_str_eq(unit_guess(SIZED_HAIR, 400, 1), "mm");
     ck_assert_str_eq(unit_guess(SIZED_HAIR, 0.004, 0.01), "m");
     ck_assert_str_eq(unit_guess(SIZED_HEAD, 180, 1), "cm");
+    ck_assert_str_eq(unit_guess(SIZED_HEAD, 32, 1), "cm"); /* 0.8 m in inches is nearer to what is likely */
+    ck_assert_str_eq(unit_guess(SIZED_HEAD, 12.5, 1), "in");
     ck_assert_ptr_null(unit_guess(SIZED_HAIR, 0.3, 1));
     ck_assert_ptr_null(unit_guess(SIZED_HEAD, 1.8, 1));
     ck_assert_ptr_null(unit_guess(SIZED_HAIR, 1e9, 1));

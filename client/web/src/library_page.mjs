@@ -1,15 +1,8 @@
 /* What there is: uploads to fit, jobs under way, grooms to open. */
 import { call, get, picture } from './api.mjs';
 import { action, ago, element, notice, say, whole } from './dom.mjs';
+import { UNITS, unitHint } from './unit_hint.mjs';
 import { giveUp, unfinished, upload } from './uploads.mjs';
-
-const UNITS = { m: 'metres', cm: 'centimetres', mm: 'millimetres', dm: 'decimetres', in: 'inches' };
-
-/* A head of hair is 0.2 to 0.8 m: a box far from it was given another unit. */
-function unitHint({ bbox }) {
-    const size = Math.max(...bbox.max.map((high, k) => high - bbox.min[k]));
-    return size > 0.08 && size < 2.5 ? '' : ` It is ${size.toPrecision(2)} m large; hair is 0.2 to 0.8 m. Is the unit right?`;
-}
 
 /* A mesh has faces: at an OBJ's end, in a PLY's header. Everything else is for the daemon to tell. */
 async function isHead(file) {
@@ -40,11 +33,13 @@ function uploadForm(refresh) {
         action('give up', () => giveUp(one).then(showBegun), { 'aria-label': `give up ${one.name}` }))));
     showBegun().catch(() => {});
     const take = async (files) => {
+        const told = [];
         bar.hidden = false;
         for (const file of files) {
             try {
                 const made = await send(file);
-                say(`${file.name}: ${made.id.startsWith('head_') ? 'a head' : `${whole(made.strands)} strands`}.${unitHint(made)}`);
+                told.push(`${file.name}: ${made.id.startsWith('head_') ? 'a head' : `${whole(made.strands)} strands`}.${unitHint(made)}`);
+                say(told.join(' '));
             } catch (error) { notice(error); }
         }
         bar.hidden = true;
