@@ -1,8 +1,44 @@
 #include "tests/support/bodies.h"
 
+#include <fcntl.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
+
+#include "groom/sample.h"
+#include "tests/support/test.h"
+
+struct groom_mesh *bodies_sample_head(void)
+{
+    struct groom_sample_options options;
+    struct groom_sample *sample;
+    struct groom_mesh *head;
+    groom_sample_options_init(GROOM_SAMPLE_STRAIGHT, &options);
+    options.n_strands = options.n_guides = options.n_operator_guides = 1;
+    if (groom_sample_create(&options, NULL, &sample, NULL) != GROOM_OK)
+        abort();
+    head = sample->head;
+    sample->head = NULL;
+    groom_sample_destroy(sample);
+    return head;
+}
+
+struct groom_mesh *bodies_shared(const char *relative, double unit_m, groom_up up, const char *group)
+{
+    const char *path = test_shared_data(relative);
+    struct groom_mesh_read_options options = {.frame = {unit_m, up}, .group = group};
+    struct groom_mesh *mesh;
+    struct groom_diag diag = {0};
+    if (!path)
+        return NULL;
+    int fd = open(path, O_RDONLY);
+    struct groom_source source = groom_source_from_fd(fd);
+    groom_status st = groom_mesh_read(&source, &options, NULL, &mesh, NULL, &diag);
+    ck_assert_msg(st == GROOM_OK, "%s", diag.detail);
+    close(fd);
+    return mesh;
+}
 
 struct groom_mesh *bodies_copy(const struct groom_mesh *mesh)
 {

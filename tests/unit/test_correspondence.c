@@ -1,32 +1,16 @@
 /* one mesh over another: by landmarks, by texture coordinates, and what is refused */
-#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "groom/correspondence.h"
-#include "groom/sample.h"
 #include "groom/spatial.h"
 #include "retarget/rotation.h"
+#include "tests/support/bodies.h"
 #include "tests/support/test.h"
 
 static const float middle[3] = {0, 1.64f, 0};
-
-static struct groom_mesh *sample_head(void)
-{
-    struct groom_sample_options options;
-    struct groom_sample *sample;
-    struct groom_mesh *head;
-    groom_sample_options_init(GROOM_SAMPLE_STRAIGHT, &options);
-    options.n_strands = options.n_guides = options.n_operator_guides = 1;
-    ck_ok(groom_sample_create(&options, NULL, &sample, NULL));
-    head = sample->head;
-    sample->head = NULL;
-    groom_sample_destroy(sample);
-    return head;
-}
 
 /* Another person's head: wider, taller, a longer back; smooth, no fold. */
 static void reshape(const float p[3], float out[3])
@@ -161,7 +145,7 @@ END_TEST
 
 START_TEST(landmarks_lay_a_head_over_another_of_other_triangles)
 {
-    struct groom_mesh *head = sample_head(), *other = other_head(head, 0), *registered;
+    struct groom_mesh *head = bodies_sample_head(), *other = other_head(head, 0), *registered;
     struct groom_correspondence_report report;
     struct groom_landmarks landmarks;
     struct groom_diag diag = {0};
@@ -183,7 +167,7 @@ END_TEST
 
 START_TEST(texture_coordinates_lay_it_exactly)
 {
-    struct groom_mesh *head = sample_head(), *other = other_head(head, 1), *registered;
+    struct groom_mesh *head = bodies_sample_head(), *other = other_head(head, 1), *registered;
     struct groom_correspondence_report report;
     struct groom_diag diag = {0};
     groom_status st = groom_correspondence_create(head, other, NULL, NULL, &registered, &report, &diag);
@@ -200,7 +184,7 @@ END_TEST
 
 START_TEST(the_same_call_gives_the_same_bits_with_more_threads)
 {
-    struct groom_mesh *head = sample_head(), *other = other_head(head, 1), *a, *b;
+    struct groom_mesh *head = bodies_sample_head(), *other = other_head(head, 1), *a, *b;
     struct groom_pool *pool;
     ck_ok(groom_pool_create(3, &pool));
     struct groom_context context = {.pool = pool};
@@ -228,7 +212,7 @@ static void check_refused(const struct groom_mesh *source, const struct groom_me
 
 START_TEST(what_cannot_be_laid_over_is_refused)
 {
-    struct groom_mesh *head = sample_head(), *bare = other_head(head, 0), *other = other_head(head, 1);
+    struct groom_mesh *head = bodies_sample_head(), *bare = other_head(head, 0), *other = other_head(head, 1);
     struct groom_landmarks landmarks;
     check_refused(head, bare, NULL, GROOM_EINVAL, "/landmarks", "the target has no texture coordinates");
     for (uint32_t i = 0; i < other->n_uvs; i++) { /* another layout */
@@ -258,7 +242,7 @@ END_TEST
 
 START_TEST(exchanged_sides_are_refused)
 {
-    struct groom_mesh *head = sample_head(), *other = other_head(head, 0), *registered = NULL;
+    struct groom_mesh *head = bodies_sample_head(), *other = other_head(head, 0), *registered = NULL;
     struct groom_landmarks landmarks;
     struct groom_diag diag = {0};
     pick(head, &landmarks);
@@ -307,20 +291,6 @@ START_TEST(landmarks_read_as_they_print_and_are_refused_at_their_field)
 }
 END_TEST
 
-static struct groom_mesh *shared_mesh(const char *relative, double unit, const char *group)
-{
-    const char *path = test_shared_data(relative);
-    struct groom_mesh_read_options options = {.frame = {unit, GROOM_UP_Y}, .group = group};
-    struct groom_mesh *mesh;
-    if (!path)
-        return NULL;
-    int fd = open(path, O_RDONLY);
-    struct groom_source source = groom_source_from_fd(fd);
-    ck_ok(groom_mesh_read(&source, &options, NULL, &mesh, NULL, NULL));
-    close(fd);
-    return mesh;
-}
-
 /* The first hit of a ray that comes from outside towards a point. */
 static void ray_to(const struct groom_mesh *mesh, const double from[3], const double to[3], float out[3])
 {
@@ -357,7 +327,7 @@ static void pick_real(const struct groom_mesh *mesh, double top, double chin, do
 
 START_TEST(sintel_lies_over_the_makehuman_head)
 {
-    struct groom_mesh *sintel = shared_mesh("sintel/head.obj", 1, NULL), *human = shared_mesh("makehuman/base.obj", 0.1, "body"), *registered;
+    struct groom_mesh *sintel = bodies_shared("sintel/head.obj", 1, GROOM_UP_Y, NULL), *human = bodies_shared("makehuman/base.obj", 0.1, GROOM_UP_Y, "body"), *registered;
     struct groom_correspondence_report report;
     struct groom_landmarks landmarks = {.n = 11};
     struct groom_diag diag = {0};

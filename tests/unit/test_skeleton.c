@@ -7,53 +7,13 @@
 #include <unistd.h>
 
 #include "groom/body.h"
-#include "groom/sample.h"
 #include "groom/skeleton.h"
 #include "groom/spatial.h"
+#include "tests/support/bodies.h"
 #include "tests/support/test.h"
 
 #define TWO "{\"bones\":[{\"name\":\"head\",\"head\":[0,1.5,0],\"tail\":[0,1.7,0]}," \
             "{\"name\":\"neck\",\"head\":[0,1.4,0],\"tail\":[0,1.5,0]}]}"
-
-static struct groom_mesh *sample_head(void)
-{
-    struct groom_sample_options options;
-    struct groom_sample *sample;
-    struct groom_mesh *head;
-    groom_sample_options_init(GROOM_SAMPLE_STRAIGHT, &options);
-    options.n_strands = options.n_guides = options.n_operator_guides = 1;
-    ck_ok(groom_sample_create(&options, NULL, &sample, NULL));
-    head = sample->head;
-    sample->head = NULL;
-    groom_sample_destroy(sample);
-    return head;
-}
-
-static struct groom_mesh *copy_of(const struct groom_mesh *mesh)
-{
-    struct groom_mesh *copy;
-    ck_ok(groom_mesh_create(mesh->n_vertices, mesh->n_triangles, 0, NULL, &copy, NULL));
-    memcpy(copy->points, mesh->points, mesh->n_vertices * sizeof *copy->points);
-    memcpy(copy->triangles, mesh->triangles, mesh->n_triangles * sizeof *copy->triangles);
-    return copy;
-}
-
-/* A file below ../shared; NULL where it is not there. */
-static struct groom_mesh *shared_mesh(const char *relative, double unit, groom_up up, const char *group)
-{
-    const char *path = test_shared_data(relative);
-    if (!path)
-        return NULL;
-    struct groom_mesh_read_options options = {.frame = {unit, up}, .group = group};
-    struct groom_mesh *mesh;
-    struct groom_diag diag = {0};
-    int fd = open(path, O_RDONLY);
-    struct groom_source source = groom_source_from_fd(fd);
-    groom_status st = groom_mesh_read(&source, &options, NULL, &mesh, NULL, &diag);
-    ck_assert_msg(st == GROOM_OK, "%s", diag.detail);
-    close(fd);
-    return mesh;
-}
 
 static const struct groom_bone *bone_of(const struct groom_skeleton *skeleton, const char *name)
 {
@@ -148,7 +108,7 @@ static void check_inside(const struct groom_skeleton *skeleton, const struct gro
 
 START_TEST(a_bare_head_gives_head_and_neck)
 {
-    struct groom_mesh *head = sample_head();
+    struct groom_mesh *head = bodies_sample_head();
     struct groom_skeleton skeleton;
     ck_ok(groom_skeleton_make(head, NULL, &skeleton, NULL));
     ck_assert_uint_eq(skeleton.n_bones, 2);
@@ -163,7 +123,7 @@ END_TEST
 
 START_TEST(a_ball_is_a_head_alone)
 {
-    struct groom_mesh *ball = sample_head();
+    struct groom_mesh *ball = bodies_sample_head();
     struct groom_skeleton skeleton;
     for (uint32_t v = 0; v < ball->n_vertices; v++) {
         double d[3], r = 0;
@@ -198,7 +158,7 @@ START_TEST(real_bodies_give_shoulders_and_arms_inside_of_them)
         {"../vectors/retarget-straight/source.obj", 1, GROOM_UP_Z, NULL, 6},
     };
     for (size_t i = 0; i < sizeof bodies / sizeof bodies[0]; i++) {
-        struct groom_mesh *mesh = shared_mesh(bodies[i].path, bodies[i].unit, bodies[i].up, bodies[i].group);
+        struct groom_mesh *mesh = bodies_shared(bodies[i].path, bodies[i].unit, bodies[i].up, bodies[i].group);
         struct groom_skeleton skeleton;
         if (!mesh)
             continue;
@@ -219,7 +179,7 @@ END_TEST
 START_TEST(an_affine_image_carries_its_skeleton_exactly)
 {
     static const double map[3][4] = {{1.2, 0.1, 0, 0.3}, {0, 0.9, 0.05, -0.2}, {-0.02, 0, 1.1, 0.1}};
-    struct groom_mesh *head = sample_head(), *image = copy_of(head);
+    struct groom_mesh *head = bodies_sample_head(), *image = bodies_copy(head);
     struct groom_skeleton skeleton, carried;
     for (uint32_t v = 0; v < head->n_vertices; v++)
         for (int i = 0; i < 3; i++)
@@ -257,7 +217,7 @@ static const struct groom_skeleton worked_target = {6, {
 
 START_TEST(regions_of_the_worked_case_are_those_of_its_file)
 {
-    struct groom_mesh *mesh = shared_mesh("../vectors/retarget-straight/source.obj", 1, GROOM_UP_Y, NULL);
+    struct groom_mesh *mesh = bodies_shared("../vectors/retarget-straight/source.obj", 1, GROOM_UP_Y, NULL);
     const char *path = test_shared_data("../vectors/retarget-straight/valid_tris.txt");
     if (!mesh || !path)
         return;
@@ -282,8 +242,8 @@ END_TEST
 
 START_TEST(the_worked_case_carries_its_skeleton_to_within_two_centimetres)
 {
-    struct groom_mesh *source = shared_mesh("../vectors/retarget-straight/source.obj", 1, GROOM_UP_Y, NULL);
-    struct groom_mesh *target = shared_mesh("../vectors/retarget-straight/target.obj", 1, GROOM_UP_Y, NULL);
+    struct groom_mesh *source = bodies_shared("../vectors/retarget-straight/source.obj", 1, GROOM_UP_Y, NULL);
+    struct groom_mesh *target = bodies_shared("../vectors/retarget-straight/target.obj", 1, GROOM_UP_Y, NULL);
     struct groom_skeleton carried;
     if (!source || !target)
         return;
@@ -305,7 +265,7 @@ END_TEST
 
 START_TEST(flipped_triangles_are_turned_right_side_out_and_told)
 {
-    struct groom_mesh *head = sample_head(), *copy = copy_of(head);
+    struct groom_mesh *head = bodies_sample_head(), *copy = bodies_copy(head);
     struct groom_body_report report;
     for (uint32_t t = 0; t < copy->n_triangles; t++)
         if (t % 3 != 1) {
@@ -347,7 +307,7 @@ static void cut_below(struct groom_mesh *mesh, float y)
 
 START_TEST(a_cut_at_the_neck_is_let_pass_and_a_sheet_refused)
 {
-    struct groom_mesh *head = sample_head(), *copy = copy_of(head);
+    struct groom_mesh *head = bodies_sample_head(), *copy = bodies_copy(head);
     struct groom_body_report report;
     struct groom_diag diag = {0};
     uint32_t n = copy->n_triangles;
@@ -367,7 +327,7 @@ END_TEST
 
 START_TEST(doubled_faces_are_refused_and_shells_told)
 {
-    struct groom_mesh *head = sample_head(), *twice;
+    struct groom_mesh *head = bodies_sample_head(), *twice;
     struct groom_body_report report;
     struct groom_diag diag = {0};
     ck_ok(groom_mesh_create(2 * head->n_vertices, 2 * head->n_triangles, 0, NULL, &twice, NULL));
@@ -415,7 +375,7 @@ END_TEST
 
 START_TEST(every_allocation_may_fail)
 {
-    struct groom_mesh *head = sample_head();
+    struct groom_mesh *head = bodies_sample_head();
     struct groom_skeleton skeleton;
     for (int what = 0; what < 2; what++)
         for (size_t fail_at = 0;; fail_at++) {
@@ -447,7 +407,7 @@ START_TEST(real_bodies_pass_with_what_is_odd_about_them_told)
         {"sintel/head.obj", 1, GROOM_UP_Y, NULL},
     };
     for (size_t i = 0; i < sizeof bodies / sizeof bodies[0]; i++) {
-        struct groom_mesh *mesh = shared_mesh(bodies[i].path, bodies[i].unit, bodies[i].up, bodies[i].group);
+        struct groom_mesh *mesh = bodies_shared(bodies[i].path, bodies[i].unit, bodies[i].up, bodies[i].group);
         struct groom_body_report report;
         struct groom_diag diag = {0};
         if (!mesh)
