@@ -13,6 +13,7 @@
 #define ROUNDS 60
 #define ROUNDS_GENTLE 12     /* after these each push goes farther than the one before: out of creases */
 #define BEYOND 1.001         /* pushed to so many clearances, so that what was pushed is clear */
+#define JUST_CLEAR 2e-6      /* metres that stubble stands off the surface at least */
 #define ROOT_SEGMENT 0.25    /* share of the clearance for the middle of a segment that begins on the surface */
 
 /* Where a point is: how far outside (negative inside) and which way leads out. */
@@ -65,14 +66,14 @@ static void middle(const float a[3], const float b[3], float out[3])
 
 /* --- counting ---------------------------------------------------------------------------------- */
 
-static void count_strand(const struct job *job, const float (*p)[3], uint32_t n, struct groom_retarget_inside *inside)
+static void count_strand(const struct job *job, const float (*p)[3], uint32_t n, double clearance, struct groom_retarget_inside *inside)
 {
     struct walk walk = walk_begin();
     for (uint32_t i = 0; i + 1 < n; i++) {
         float m[3];
         middle(p[i], p[i + 1], m);
-        struct place between = place_of(job, m, 0, &walk), at = place_of(job, p[i + 1], job->options->clearance, &walk);
-        inside->near_vertices += at.outside < job->options->clearance;
+        struct place between = place_of(job, m, 0, &walk), at = place_of(job, p[i + 1], clearance, &walk);
+        inside->near_vertices += at.outside < clearance;
         inside->vertices += at.outside < 0;
         inside->segments += between.outside < 0;
         inside->deepest = fmax(inside->deepest, -at.outside);
@@ -142,6 +143,35 @@ static int clear_strand(const struct job *job, float (*p)[3], uint32_t n)
     return 0;
 }
 
+/* --- stubble ---------------------------------------------------------------------------------- */
+
+/* Whether a strand of the source is shorter than the clearance: it can have its length or be clear, not both. A groomer
+ * shaves to a length, so that is what it keeps. */
+static int is_short(const struct job *job, uint32_t strand)
+{
+    const struct groom_strands *strands = job->source->strands;
+    double length = 0;
+    for (uint32_t i = strands->first[strand]; i + 1 < strands->first[strand + 1] && length < job->options->clearance; i++)
+        length += apart(strands->points[i], strands->points[i + 1]);
+    return length < job->options->clearance;
+}
+
+/* On the surface floats cannot tell in from out: all but the root are a little above it. */
+static void stand_up(const struct job *job, uint32_t strand, float (*p)[3], uint32_t n)
+{
+    const float(*rest)[3] = (const float(*)[3])job->source->strands->points + job->source->strands->first[strand];
+    struct groom_surface_point near;
+    double outside = field_signed(&job->field, p[0], &near), arc;
+    if (outside == INFINITY)
+        return;
+    arc = JUST_CLEAR + 2.1 * fmax(0, -outside); /* the first segment's middle, too */
+    for (uint32_t i = 1; i < n; i++) {
+        arc += apart(rest[i - 1], rest[i]);
+        memcpy(p[i], p[0], sizeof p[i]);
+        push(p[i], vec_of(near.normal), arc);
+    }
+}
+
 /* --- all strands --------------------------------------------------------------------------------- */
 
 struct clearing {
@@ -154,9 +184,22 @@ struct clearing {
 static void count_before(struct job *job, const float (*p)[3], uint32_t n, uint32_t strand, struct groom_retarget_inside *inside)
 {
     uint64_t last = inside->near_vertices + inside->segments;
-    count_strand(job, p, n, inside);
+    count_strand(job, p, n, job->options->clearance, inside);
     if (job->standing && inside->near_vertices + inside->segments > last)
         job->standing[strand] = STANDING_IN_CONFLICT;
+}
+
+static void clear_one(struct job *job, uint32_t strand, float (*p)[3], uint32_t n, struct groom_retarget_inside *inside)
+{
+    if (job->standing[strand] & STANDING_STAYS)
+        return;
+    if (is_short(job, strand)) {
+        job->standing[strand] |= STANDING_SHORT;
+        stand_up(job, strand, p, n);
+        count_strand(job, (const float(*)[3])p, n, 0, inside);
+    } else if (!clear_strand(job, p, n)) {
+        count_strand(job, (const float(*)[3])p, n, job->options->clearance, inside);
+    }
 }
 
 /* What was cleared to the end has nothing to count. */
@@ -169,10 +212,10 @@ static void clear_piece(void *user, uint32_t piece, uint32_t thread)
     for (uint32_t i = piece * PIECE; i < strands->n_strands && i - piece * PIECE < PIECE; i++) {
         float(*p)[3] = clearing->points + strands->first[i];
         uint32_t n = strands->first[i + 1] - strands->first[i];
-        if (!clearing->push)
+        if (clearing->push)
+            clear_one(clearing->job, i, p, n, &clearing->inside[piece]);
+        else
             count_before(clearing->job, (const float(*)[3])p, n, i, &clearing->inside[piece]);
-        else if (!(clearing->job->standing[i] & STANDING_STAYS) && !clear_strand(clearing->job, p, n))
-            count_strand(clearing->job, (const float(*)[3])p, n, &clearing->inside[piece]);
     }
 }
 

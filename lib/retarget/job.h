@@ -18,7 +18,8 @@
 /* What the initial transfer tells of a strand. */
 enum standing {
     STANDING_STAYS = 1,      /* it is where it was and keeps the clearance: nothing moves it */
-    STANDING_IN_CONFLICT = 2 /* something of it is inside or too near */
+    STANDING_IN_CONFLICT = 2, /* something of it is inside or too near */
+    STANDING_SHORT = 4        /* by the last pass: shorter than the clearance, which it cannot keep */
 };
 
 struct job {
@@ -111,7 +112,8 @@ float contact_away(const struct job *job, const float p[3]);
 
 /* --- the exact last pass (clearance.c) --------------------------------------------------- */
 
-/* Moves what is too near out of the body; roots stay. points [n_vertices] in metres; left: what could not be moved out. */
+/* Moves what is too near out of the body; roots stay. A strand shorter than the clearance stands up from its root, with
+ * its length kept. points [n_vertices] in metres; left: what could not be moved out. */
 groom_status clearance_apply(struct job *job, float (*points)[3], struct groom_retarget_inside *left, struct groom_diag *diag);
 /* Counts what is inside and notes which strands that is of. points are as they were. */
 groom_status clearance_count(struct job *job, float (*points)[3], struct groom_retarget_inside *inside, struct groom_diag *diag);

@@ -68,7 +68,8 @@ static int put_measures(cJSON *object, const struct groom_retarget_report *repor
            put_number(length, "median", report->length_ratio_median) && put_number(length, "max", report->length_ratio_max) &&
            put_number(movement, "mean", report->movement_mean) && put_number(movement, "max", report->movement_max) &&
            put_movement(movement, "in_conflict", &report->movement_conflict) &&
-           put_movement(movement, "others", &report->movement_others) && put_number(object, "unchanged", report->n_unchanged);
+           put_movement(movement, "others", &report->movement_others) && put_number(object, "unchanged", report->n_unchanged) &&
+           put_number(object, "shorter_than_clearance", report->n_short);
 }
 
 static int put_seconds(cJSON *object, const struct groom_retarget_report *report)

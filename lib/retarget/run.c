@@ -371,6 +371,7 @@ static void fill_values(const struct job *job, const float (*points)[3], const s
         movement->strands++;
         n_conflict += in_conflict ? strands->first[s + 1] - strands->first[s] : 0;
         report->n_unchanged += (job->standing[s] & STANDING_STAYS) != 0;
+        report->n_short += (job->standing[s] & STANDING_SHORT) != 0;
         for (uint32_t i = strands->first[s]; i < strands->first[s + 1]; i++) {
             float hat[3];
             for (int c = 0; c < 3; c++)

@@ -294,6 +294,31 @@ START_TEST(buried_roots_come_to_lie_on_the_surface)
 }
 END_TEST
 
+/* Stubble: a strand shorter than the clearance has its length or the clearance, not both. */
+START_TEST(stubble_keeps_its_length)
+{
+    struct scene s;
+    scene_init(&s, GROOM_SAMPLE_SHORT, 200, 6, 1);
+    for (uint32_t i = 0; i < 50; i++)
+        for (uint32_t j = s.strands->first[i] + 1; j < s.strands->first[i + 1]; j++)
+            for (int c = 0; c < 3; c++) /* 0.3 mm where the strand is 3 cm */
+                s.strands->points[j][c] = s.strands->points[s.strands->first[i]][c] +
+                                          0.01f * (s.strands->points[j][c] - s.strands->points[s.strands->first[i]][c]);
+    points out = room_for(s.strands);
+    struct groom_retarget_report report = carry(s.strands, &s.self, &s.target, &s.options, NULL, out);
+    ck_assert_uint_ge(report.n_short, 40);
+    ck_assert_uint_eq(report.inside_after.vertices + report.inside_after.segments + report.inside_after.near_vertices, 0);
+    for (uint32_t i = 0; i < s.strands->n_strands; i++) {
+        uint32_t first = s.strands->first[i], n = s.strands->first[i + 1] - first;
+        double was = groom_polyline_length((const float(*)[3])s.strands->points + first, n);
+        if (was < s.options.clearance)
+            ck_assert_double_eq_tol(groom_polyline_length((const float(*)[3])out + first, n), was, 5e-6);
+    }
+    free(out);
+    scene_finish(&s);
+}
+END_TEST
+
 /* --- scales ------------------------------------------------------------------------------------ */
 
 START_TEST(two_scales_come_near_the_global_solution)
@@ -692,7 +717,7 @@ END_TEST
 TEST_SUITE("retarget_samples", retargeting_to_oneself_changes_nothing, to_oneself_only_what_is_inside_is_moved,
            there_and_back_is_nearly_where_it_was,
            what_is_inside_is_brought_out, roots_stay_on_the_surface, roots_on_the_crown_stay_on_the_head_beside_an_arm,
-           buried_roots_come_to_lie_on_the_surface, two_scales_come_near_the_global_solution,
+           stubble_keeps_its_length, buried_roots_come_to_lie_on_the_surface, two_scales_come_near_the_global_solution,
            steps_come_as_low_as_the_iterations_of_the_paper, energies_of_steps_are_those_of_where_they_lead,
            same_bits_for_any_pool, weight_follows_equation_20, moved_roots_are_kept_and_tips_hardly_follow,
            a_procedural_groom_stays_procedural, a_groom_made_of_strands_has_them_carried,

@@ -161,6 +161,9 @@ struct groom_retarget_report {
      * was (to 1e-6 m) and that keeps the clearance is unchanged to the bit, whatever its neighbours do. */
     struct groom_retarget_movement movement_conflict, movement_others;
     uint32_t n_unchanged;
+    /* Strands shorter than the clearance: they stand up from their roots with their length kept, nearer than the
+     * clearance; inside_after does not count that as too near. */
+    uint32_t n_short;
     double seconds_initial, seconds_coarse, seconds_fine, seconds_whole, seconds_clearance, seconds_total;
 };
 
@@ -180,7 +183,7 @@ GROOM_MUST_CHECK groom_status groom_retarget_roots(const struct groom_retarget_s
                                                    struct groom_diag *diag);
 
 /* Carry the strands over. The last pass is exact: whatever the iterations left inside is moved out, so that
- * but for roots no vertex is nearer to the body than the clearance, and no segment's middle is inside.
+ * but for roots and strands shorter than it no vertex is nearer to the body than the clearance, and no segment's middle is inside.
  * out      [n_vertices] in the layout of the source's strands; unspecified on error
  * report, values  may be NULL
  * returns  GROOM_OK, GROOM_EINVAL (other triangles, other bones, not finite), GROOM_ENOMEM, GROOM_ECANCELLED */
@@ -195,7 +198,7 @@ GROOM_MUST_CHECK groom_status groom_retarget_run(const struct groom_retarget_sou
  *  "energy":{"before":{"shape","inter","body","total"},"after":...},
  *  "inside":{"before":{"vertices","segments","near_vertices","deepest"},"after":...},
  *  "length_ratio":{"min","median","max"},
- *  "movement":{"mean","max","in_conflict":{"strands","mean","max"},"others":{"strands","mean","max"}},"unchanged",
+ *  "movement":{"mean","max","in_conflict":{"strands","mean","max"},"others":{"strands","mean","max"}},"unchanged","shorter_than_clearance",
  *  "seconds":{"initial","coarse","fine","clearance","total"},"coarse":[{"energy","mean_movement"},...]}
  * malloc'd, for the caller to free(). */
 GROOM_MUST_CHECK groom_status groom_retarget_report_print(const struct groom_retarget_report *report, char **json,
