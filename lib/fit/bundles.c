@@ -162,6 +162,60 @@ static groom_status name_guides(struct bundling *b, uint32_t *guide, const struc
     return st;
 }
 
+/* The mean shape of a region: of its strands' clusters, from their roots on. points [n_guides * m], shape [n_gop * m] */
+static void mean_shapes(const struct bundling *b, const float (*points)[3], float (*shape)[3])
+{
+    const struct groom_fit *fit = b->fit;
+    uint32_t m = fit->m, n_op = fit->groom->n_operator_guides;
+    memset(shape, 0, (size_t)n_op * m * sizeof *shape);
+    for (uint32_t i = 0; i < fit->n; i++) {
+        const float (*x)[3] = points + (size_t)fit->cluster_of[i] * m;
+        for (uint32_t j = 0; j < m; j++)
+            for (int c = 0; c < 3; c++)
+                shape[(size_t)b->region[i] * m + j][c] += (x[j][c] - x[0][c]) / (float)b->count[b->region[i]];
+    }
+}
+
+/* Where the middle of a region's roots is on the head, or near it. */
+static void root_of(const struct bundling *b, uint32_t k, float root[3])
+{
+    struct groom_surface_point surface;
+    for (int c = 0; c < 3; c++)
+        root[c] = (float)b->middle[k][c];
+    if (b->fit->bvh && groom_bvh_closest(b->fit->bvh, root, INFINITY, &surface))
+        memcpy(root, surface.position, sizeof surface.position);
+}
+
+/* The centroids of operator guides go to the middles of their regions; ... shape [n_gop * m] scratch */
+static void move_centroids(const struct bundling *b, const uint32_t *guide, float (*shape)[3])
+{
+    struct groom_fit *fit = b->fit;
+    mean_shapes(b, (const float (*)[3])fit->centroids, shape);
+    for (uint32_t k = 0; k < fit->groom->n_operator_guides; k++)
+        for (uint32_t j = 0; b->count[k] > 0 && j < fit->m; j++)
+            for (int c = 0; c < 3; c++)
+                fit->centroids[(size_t)guide[k] * fit->m + j][c] =
+                    ((float)b->middle[k][c] - fit->centre[c]) / fit->scale + shape[(size_t)k * fit->m + j][c];
+}
+
+/* ... and the guides to where these are on the head. */
+static void move_guides(const struct bundling *b, const uint32_t *guide, float (*shape)[3], const struct groom_context *context)
+{
+    const struct groom_fit *fit = b->fit;
+    struct groom *groom = fit->groom;
+    mean_shapes(b, (const float (*)[3])groom->guides, shape);
+    for (uint32_t k = 0; k < groom->n_operator_guides; k++) {
+        float (*x)[3] = groom->guides + (size_t)guide[k] * fit->m, root[3];
+        if (b->count[k] == 0)
+            continue;
+        root_of(b, k, root);
+        for (uint32_t j = 0; j < fit->m; j++)
+            for (int c = 0; c < 3; c++)
+                x[j][c] = root[c] + shape[(size_t)k * fit->m + j][c];
+        groom_scalp_coordinates(fit->scalp, (const float (*)[3])x, 1, groom->guide_uv + guide[k], context);
+    }
+}
+
 /* Operator guides ascend, in the groom. number [n_gop]: a region's place among them */
 static void write_assignment(struct bundling *b, const uint32_t *guide, uint32_t *number)
 {
@@ -184,8 +238,10 @@ static groom_status find(struct bundling *b, const struct groom_context *context
     const struct groom_allocator *allocator = memory_allocator(context);
     uint32_t n = b->fit->n, n_op = b->fit->groom->n_operator_guides;
     struct groom_neighbours *index = NULL;
+    size_t n_shape = (size_t)n_op * b->fit->m;
     uint32_t *guide = memory_array(allocator, n_op, 2 * sizeof *guide);
-    groom_status st = guide ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to name operator guides");
+    float (*shape)[3] = memory_array(allocator, n_shape, sizeof *shape);
+    groom_status st = guide && shape ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to name operator guides");
     if (st != GROOM_OK ||
         (st = groom_neighbours_create(b->fit->root_uv[0], n, 2, context, &index, diag)) != GROOM_OK ||
         (st = groom_neighbours_find(index, b->fit->root_uv[0], n, NEIGHBOURS + 1, b->neighbour, NULL, context, diag)) != GROOM_OK)
@@ -205,10 +261,13 @@ static groom_status find(struct bundling *b, const struct groom_context *context
         groom_fail(diag, st, "no memory to name %u operator guides", n_op);
         goto out;
     }
+    move_centroids(b, guide, shape);
+    move_guides(b, guide, shape, context);
     write_assignment(b, guide, guide + n_op);
 out:
     groom_neighbours_destroy(index);
     memory_release(allocator, guide, n_op, 2 * sizeof *guide);
+    memory_release(allocator, shape, n_shape, sizeof *shape);
     return st;
 }
 

@@ -10,9 +10,10 @@
  * and by their lengths, which say nothing of bundles. Within a bundle neighbours are much more alike than
  * across its border, even where its far ends are not: strands are merged across borders of least difference
  * (fit/regions.h) until there are as many bundles as operator guides. The guide nearest to the middle of a
- * bundle becomes its operator guide.
+ * bundle becomes its operator guide, and is moved there with the shape that guides have around: strands close
+ * in on it from where they stand, so that a root elsewhere would bend it by as much.
  *
- * Fills operator_guide and operator_guide_of of the fit's groom.
+ * Fills operator_guide and operator_guide_of of the fit's groom, and moves those guides and their centroids.
  * returns  GROOM_OK, GROOM_ENOMEM
  * threads  same bits for any pool */
 GROOM_MUST_CHECK groom_status bundles_find(struct groom_fit *fit, const struct groom_context *context,

@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 
-#define CHECKPOINT_VERSION 3
+#define CHECKPOINT_VERSION 4
 
 struct checkpoint_header {
     char magic[8];          /* "GROOMFIT" */

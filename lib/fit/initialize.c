@@ -16,7 +16,7 @@
 #include "fit/state.h"
 #include "geometry/kmeans.h"
 
-enum phase { SEED, CLUSTER, GUIDES, OPERATOR_GUIDES, INSTANCE, OPERATORS, ASSIGN, ENDED };
+enum phase { SEED, CLUSTER, GUIDES, OPERATOR_GUIDES, OPERATORS, BUNDLES, INSTANCE, ASSIGN, ENDED };
 
 #define STREAM_CLUSTERS 0x66690001u
 #define STREAM_MEDOIDS 0x66690002u
@@ -246,7 +246,7 @@ static groom_status choose_operator_guides(struct groom_fit *fit, const struct g
         return st;
     double per_vertex = 1 / sqrt(groom->n_vertices);
     report_loss(&fit->report, "initialize", "medoids", before * per_vertex, after * per_vertex);
-    fit->phase = INSTANCE;
+    fit->phase = OPERATORS;
     return GROOM_OK;
 }
 
@@ -259,16 +259,23 @@ static int moves_bundles(const struct groom_fit_options *options)
     return together;
 }
 
+/* Estimates look at clusters by their mean strands: they come before, for bundles move some of these. */
+static groom_status bundle(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    groom_status st = assign_nearest(fit->groom, context, diag);
+    if (st == GROOM_OK && moves_bundles(&fit->options))
+        st = bundles_find(fit, context, diag);
+    if (st == GROOM_OK)
+        fit->phase = INSTANCE;
+    return st;
+}
+
 static groom_status instance(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     float sigma = (float)fit->options.stages.initialize.sigma_instance;
     groom_status st = groom_instance_by_distance(fit->groom, sigma, context, diag);
     if (st == GROOM_OK)
-        st = assign_nearest(fit->groom, context, diag);
-    if (st == GROOM_OK && moves_bundles(&fit->options))
-        st = bundles_find(fit, context, diag);
-    if (st == GROOM_OK)
-        fit->phase = OPERATORS;
+        fit->phase = ASSIGN;
     return st;
 }
 
@@ -286,7 +293,7 @@ static groom_status make_operators(struct groom_fit *fit, const struct groom_con
             estimate_apply(&estimates, &groom->operators[i]);
     }
     if (st == GROOM_OK) {
-        fit->phase = ASSIGN;
+        fit->phase = BUNDLES;
         return GROOM_OK;
     }
     while (groom->n_operators > 0 && groom_remove_operator(groom, groom->n_operators - 1, NULL) == GROOM_OK)
@@ -303,8 +310,9 @@ groom_status initialize_step(struct groom_fit *fit, int *ended, const struct gro
     case CLUSTER: st = cluster(fit, context, diag); break;
     case GUIDES: st = make_guides(fit, context, diag); break;
     case OPERATOR_GUIDES: st = choose_operator_guides(fit, context, diag); break;
-    case INSTANCE: st = instance(fit, context, diag); break;
     case OPERATORS: st = make_operators(fit, context, diag); break;
+    case BUNDLES: st = bundle(fit, context, diag); break;
+    case INSTANCE: st = instance(fit, context, diag); break;
     case ASSIGN: st = assign_step(fit, ended, context, diag); break;
     case ENDED: break;
     }
@@ -314,7 +322,7 @@ groom_status initialize_step(struct groom_fit *fit, int *ended, const struct gro
 double initialize_fraction(const struct groom_fit *fit)
 {
     /* where each phase begins, by its time on 30 000 strands */
-    static const double begin[] = {0, 0.15, 0.7, 0.72, 0.76, 0.8, 0.82, 1};
+    static const double begin[] = {0, 0.15, 0.7, 0.72, 0.76, 0.78, 0.81, 0.82, 1};
     double within = 0;
     if (fit->phase == CLUSTER)
         within = (double)fit->iteration / fit->options.stages.initialize.cluster_iterations;
@@ -333,8 +341,9 @@ int initialize_sound(const struct groom_fit *fit)
                (fit->iteration == 0 || fit->report.n_losses > 0);
     case GUIDES: return has_clusters && !has_groom;
     case OPERATOR_GUIDES:
-    case INSTANCE:
     case OPERATORS: return has_clusters && has_groom && fit->groom->n_operators == 0;
+    case BUNDLES:
+    case INSTANCE: return has_clusters && has_groom;
     case ASSIGN: return has_clusters && has_groom && fit->iteration < fit->n;
     case ENDED: break;
     }

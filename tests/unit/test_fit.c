@@ -591,6 +591,9 @@ START_TEST(guides_are_smoothed_means_of_their_clusters)
     struct groom_sample *sample = sample_of(GROOM_SAMPLE_STRAIGHT, 200, 0);
     struct groom_fit_options options = options_of(20, 5, 24);
     options.stages.initialize.n_smooth = 0;
+    options.operators_auto = 0; /* nor curl nor clump: no guide is moved to the middle of a bundle */
+    options.operators[0] = GROOM_OPERATOR_SCALE;
+    options.n_operators = 1;
     struct groom_fit *fit = fit_of(sample->capture, sample->head, &options, NULL);
     run_to(fit, FIT_STAGE_instance_weights);
     for (uint32_t g = 0; g < fit->n_guides; g++)

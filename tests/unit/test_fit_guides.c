@@ -243,6 +243,36 @@ END_TEST
 
 /* --- the stage ------------------------------------------------------------------------------------- */
 
+/* Of operator guides that some strands follow, from the mean root of these: metres, the mean over strands. */
+static double off_middle(const struct groom *groom)
+{
+    double sum = 0;
+    for (uint32_t o = 0; o < groom->n_operator_guides; o++) {
+        const float *root = groom->guides[(size_t)groom->operator_guide[o] * groom->n_vertices];
+        double off[3] = {0};
+        for (uint32_t i = 0; i < groom->n_strands; i++)
+            for (int c = 0; groom->operator_guide_of[i] == o && c < 3; c++)
+                off[c] += (double)groom->roots[i][c] - root[c];
+        sum += sqrt(off[0] * off[0] + off[1] * off[1] + off[2] * off[2]); /* n times the distance */
+    }
+    return sum / groom->n_strands;
+}
+
+/* The middle of roots on a round head is a little inside: 16 mm around it, 1.5 mm. */
+START_TEST(operator_guides_of_bundles_stand_in_their_middle)
+{
+    struct groom_fit_options options;
+    groom_fit_options_init(GROOM_FIT_DRAFT, &options);
+    options.guides = 60;
+    options.operator_guides = 30;
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_SPIKY, 600, VERTICES, 1, NULL);
+    struct groom_fit *fit = guides_fit(sample, &options, "instance_weights", NULL);
+    ck_assert_double_lt(off_middle(fit->groom), 0.003);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
 START_TEST(the_stage_reports_its_loss_and_leaves_roots)
 {
     struct rig rig;
@@ -283,6 +313,7 @@ int main(void)
     tcase_add_test(parts, few_guides_and_guides_of_one_root_have_neighbours);
     tcase_add_test(parts, the_matrix_is_symmetric_and_positive);
     tcase_add_test(parts, the_solution_is_the_minimum);
+    tcase_add_test(parts, operator_guides_of_bundles_stand_in_their_middle);
     tcase_add_test(parts, the_stage_reports_its_loss_and_leaves_roots);
     suite_add_tcase(suite, parts);
     SRunner *runner = srunner_create(suite);
