@@ -176,43 +176,19 @@ static void mean_shapes(const struct bundling *b, const float (*points)[3], floa
     }
 }
 
-/* Where the middle of a region's roots is on the head, or near it. */
-static void root_of(const struct bundling *b, uint32_t k, float root[3])
-{
-    struct groom_surface_point surface;
-    for (int c = 0; c < 3; c++)
-        root[c] = (float)b->middle[k][c];
-    if (b->fit->bvh && groom_bvh_closest(b->fit->bvh, root, INFINITY, &surface))
-        memcpy(root, surface.position, sizeof surface.position);
-}
-
-/* The centroids of operator guides go to the middles of their regions; ... shape [n_gop * m] scratch */
-static void move_centroids(const struct bundling *b, const uint32_t *guide, float (*shape)[3])
+/* Operator guides, and their centroids, take the mean shapes of their regions. shape [n_gop * m] scratch */
+static void shape_guides(const struct bundling *b, const uint32_t *guide, float (*shape)[3])
 {
     struct groom_fit *fit = b->fit;
-    mean_shapes(b, (const float (*)[3])fit->centroids, shape);
-    for (uint32_t k = 0; k < fit->groom->n_operator_guides; k++)
-        for (uint32_t j = 0; b->count[k] > 0 && j < fit->m; j++)
-            for (int c = 0; c < 3; c++)
-                fit->centroids[(size_t)guide[k] * fit->m + j][c] =
-                    ((float)b->middle[k][c] - fit->centre[c]) / fit->scale + shape[(size_t)k * fit->m + j][c];
-}
-
-/* ... and the guides to where these are on the head. */
-static void move_guides(const struct bundling *b, const uint32_t *guide, float (*shape)[3], const struct groom_context *context)
-{
-    const struct groom_fit *fit = b->fit;
-    struct groom *groom = fit->groom;
-    mean_shapes(b, (const float (*)[3])groom->guides, shape);
-    for (uint32_t k = 0; k < groom->n_operator_guides; k++) {
-        float (*x)[3] = groom->guides + (size_t)guide[k] * fit->m, root[3];
-        if (b->count[k] == 0)
-            continue;
-        root_of(b, k, root);
-        for (uint32_t j = 0; j < fit->m; j++)
-            for (int c = 0; c < 3; c++)
-                x[j][c] = root[c] + shape[(size_t)k * fit->m + j][c];
-        groom_scalp_coordinates(fit->scalp, (const float (*)[3])x, 1, groom->guide_uv + guide[k], context);
+    float (*const points[2])[3] = {fit->centroids, fit->groom->guides};
+    for (int which = 0; which < 2; which++) {
+        mean_shapes(b, (const float (*)[3])points[which], shape);
+        for (uint32_t k = 0; k < fit->groom->n_operator_guides; k++) {
+            float (*x)[3] = points[which] + (size_t)guide[k] * fit->m;
+            for (uint32_t j = 1; b->count[k] > 0 && j < fit->m; j++)
+                for (int c = 0; c < 3; c++)
+                    x[j][c] = x[0][c] + shape[(size_t)k * fit->m + j][c];
+        }
     }
 }
 
@@ -231,6 +207,54 @@ static void write_assignment(struct bundling *b, const uint32_t *guide, uint32_t
         groom->operator_guide_of[i] = number[b->region[i]];
 }
 
+/* --- where they stand ------------------------------------------------------------------------- */
+
+/* Moves a guide so that its root is here, or on the head next to here. */
+static void stand(struct groom_fit *fit, uint32_t guide, const double middle[3], const struct groom_context *context)
+{
+    float (*x)[3] = fit->groom->guides + (size_t)guide * fit->m, to[3] = {(float)middle[0], (float)middle[1], (float)middle[2]};
+    struct groom_surface_point surface;
+    if (fit->bvh && groom_bvh_closest(fit->bvh, to, INFINITY, &surface))
+        memcpy(to, surface.position, sizeof to);
+    for (int c = 0; c < 3; c++) {
+        float move = to[c] - x[0][c];
+        for (uint32_t j = 0; j < fit->m; j++)
+            x[j][c] += move;
+    }
+    groom_scalp_coordinates(fit->scalp, (const float (*)[3])x, 1, fit->groom->guide_uv + guide, context);
+}
+
+struct middle { double sum[3], n; }; /* of roots */
+
+/* Operator guides to the middles of their strands. middle [n_gop] scratch, zeroed */
+static void centre(struct groom_fit *fit, struct middle *middle, const struct groom_context *context)
+{
+    const struct groom *groom = fit->groom;
+    for (uint32_t i = 0; i < fit->n; i++) {
+        struct middle *of = &middle[groom->operator_guide_of[i]];
+        for (int c = 0; c < 3; c++)
+            of->sum[c] += (double)fit->roots[i][c];
+        of->n++;
+    }
+    for (uint32_t o = 0; o < groom->n_operator_guides; o++) {
+        const double n = middle[o].n, at[3] = {middle[o].sum[0] / n, middle[o].sum[1] / n, middle[o].sum[2] / n};
+        if (n > 0)
+            stand(fit, groom->operator_guide[o], at, context);
+    }
+}
+
+groom_status bundles_centre(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    uint32_t n_op = fit->groom->n_operator_guides;
+    struct middle *middle = memory_array_zero(allocator, n_op, sizeof *middle);
+    if (!middle)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to move %u operator guides", n_op);
+    centre(fit, middle, context);
+    memory_release(allocator, middle, n_op, sizeof *middle);
+    return GROOM_OK;
+}
+
 /* --- all --------------------------------------------------------------------------------------- */
 
 static groom_status find(struct bundling *b, const struct groom_context *context, struct groom_diag *diag)
@@ -241,7 +265,8 @@ static groom_status find(struct bundling *b, const struct groom_context *context
     size_t n_shape = (size_t)n_op * b->fit->m;
     uint32_t *guide = memory_array(allocator, n_op, 2 * sizeof *guide);
     float (*shape)[3] = memory_array(allocator, n_shape, sizeof *shape);
-    groom_status st = guide && shape ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to name operator guides");
+    struct middle *middle = memory_array_zero(allocator, n_op, sizeof *middle);
+    groom_status st = guide && shape && middle ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to name operator guides");
     if (st != GROOM_OK ||
         (st = groom_neighbours_create(b->fit->root_uv[0], n, 2, context, &index, diag)) != GROOM_OK ||
         (st = groom_neighbours_find(index, b->fit->root_uv[0], n, NEIGHBOURS + 1, b->neighbour, NULL, context, diag)) != GROOM_OK)
@@ -261,13 +286,14 @@ static groom_status find(struct bundling *b, const struct groom_context *context
         groom_fail(diag, st, "no memory to name %u operator guides", n_op);
         goto out;
     }
-    move_centroids(b, guide, shape);
-    move_guides(b, guide, shape, context);
+    shape_guides(b, guide, shape);
     write_assignment(b, guide, guide + n_op);
+    centre(b->fit, middle, context);
 out:
     groom_neighbours_destroy(index);
     memory_release(allocator, guide, n_op, 2 * sizeof *guide);
     memory_release(allocator, shape, n_shape, sizeof *shape);
+    memory_release(allocator, middle, n_op, sizeof *middle);
     return st;
 }
 

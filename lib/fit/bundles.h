@@ -19,4 +19,9 @@
 GROOM_MUST_CHECK groom_status bundles_find(struct groom_fit *fit, const struct groom_context *context,
                                            struct groom_diag *diag);
 
+/* Moves each operator guide, as it is shaped, to the middle of the strands that follow it, on the head.
+ * returns  GROOM_OK, GROOM_ENOMEM: nothing has moved */
+GROOM_MUST_CHECK groom_status bundles_centre(struct groom_fit *fit, const struct groom_context *context,
+                                             struct groom_diag *diag);
+
 #endif

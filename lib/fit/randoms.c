@@ -17,6 +17,7 @@
 
 #include "base/memory.h"
 #include "base/progress.h"
+#include "fit/bundles.h"
 #include "fit/gather.h"
 #include "fit/guides.h"
 #include "fit/loss_strands.h"
@@ -275,7 +276,9 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
 
 static groom_status reshape_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
-    groom_status st = guides_refine(fit, context, diag);
+    groom_status st = clumps(fit->groom) ? bundles_centre(fit, context, diag) : GROOM_OK;
+    if (st == GROOM_OK)
+        st = guides_refine(fit, context, diag);
     if (st == GROOM_OK)
         st = operators_refine(fit, fit->options.stages.randoms.refinements, context, diag);
     if (st == GROOM_OK)
