@@ -274,9 +274,34 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
     return GROOM_EINTERNAL;
 }
 
+/* A scale is 1 on average: what the numbers found have in common is the guides' length. */
+static void centre_scale(struct groom *groom, struct groom_operator *op)
+{
+    double sum = 0, random_scale = op->parameter[0];
+    for (uint32_t i = 0; i < groom->n_strands; i++)
+        sum += 1 + random_scale * op->random[0][i];
+    double common = sum / groom->n_strands;
+    if (!(common > 0))
+        return;
+    for (uint32_t i = 0; i < groom->n_strands; i++) {
+        double number = ((1 + random_scale * op->random[0][i]) / common - 1) / random_scale;
+        op->random[0][i] = (float)fmin(fmax(number, -1), 1);
+    }
+    for (uint32_t g = 0; g < groom->n_guides; g++) {
+        float (*x)[3] = groom->guides + (size_t)g * groom->n_vertices;
+        for (uint32_t j = 1; j < groom->n_vertices; j++)
+            for (int c = 0; c < 3; c++)
+                x[j][c] = (float)(x[0][c] + common * ((double)x[j][c] - x[0][c]));
+    }
+}
+
 static groom_status reshape_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
-    groom_status st = clumps(fit->groom) ? bundles_centre(fit, context, diag) : GROOM_OK;
+    struct groom *groom = fit->groom;
+    groom_status st = clumps(groom) ? bundles_centre(fit, context, diag) : GROOM_OK;
+    for (uint32_t o = 0; st == GROOM_OK && o < groom->n_operators; o++)
+        if (groom->operators[o].type == GROOM_OPERATOR_SCALE && has_effect(&groom->operators[o]))
+            centre_scale(groom, &groom->operators[o]);
     if (st == GROOM_OK)
         st = guides_refine(fit, context, diag);
     if (st == GROOM_OK)
