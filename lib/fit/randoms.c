@@ -40,10 +40,10 @@
 /* --- the row of passes ------------------------------------------------------------------------- */
 
 /* What is looked for: which operator guide each strand follows, the numbers of strands in one operator,
- * those of operator guides, the last digits of all that a strand has, or the guides that go with them and the
- * operators' parameters for these guides. */
+ * those of operator guides, the last digits of all that a strand has, what these tell of where operator guides stand
+ * and how long guides are, or the guides that go with them and the operators' parameters for these guides. */
 struct pass {
-    enum { FOLLOW, STRANDS, CURLS, POLISH, RESHAPE } kind;
+    enum { FOLLOW, STRANDS, CURLS, POLISH, CENTRE, RESHAPE } kind;
     uint32_t round;
     uint32_t op, active; /* of STRANDS and CURLS: its index in the chain, and among those that are enabled */
 };
@@ -79,7 +79,7 @@ static uint32_t list_numbers(const struct groom *groom, uint32_t round, int per_
 static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST_PASSES])
 {
     uint32_t n = 0, n_rounds = fit->options.stages.randoms.rounds;
-    for (uint32_t round = 0; round < n_rounds && n + GROOM_FIT_MAX_OPERATORS + 2 <= MOST_PASSES; round++) {
+    for (uint32_t round = 0; round < n_rounds && n + GROOM_FIT_MAX_OPERATORS + 4 <= MOST_PASSES; round++) {
         uint32_t n_curls = list_numbers(fit->groom, round, 1, passes + n), begin = n;
         n += n_curls;
         if (n_curls > 0 || clumps(fit->groom))
@@ -87,8 +87,10 @@ static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST
         n += list_numbers(fit->groom, round, 0, passes + n);
         if (n > begin) {
             passes[n++] = (struct pass){.kind = POLISH, .round = round};
-            if (round + 1 < n_rounds)
+            if (round + 1 < n_rounds) {
+                passes[n++] = (struct pass){.kind = CENTRE, .round = round};
                 passes[n++] = (struct pass){.kind = RESHAPE, .round = round};
+            }
         }
     }
     return n;
@@ -96,7 +98,7 @@ static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST
 
 static uint32_t size_of(const struct groom_fit *fit, const struct pass *pass)
 {
-    if (pass->kind == RESHAPE)
+    if (pass->kind == CENTRE || pass->kind == RESHAPE)
         return 1;
     return pass->kind == CURLS ? fit->groom->n_operator_guides : fit->n;
 }
@@ -245,6 +247,7 @@ static uint32_t step_size(const struct groom_fit *fit, const struct pass *pass)
     case STRANDS: values = grid_of(fit, pass); break;
     case CURLS: values = CURL_VALUES * fit->options.stages.randoms.strands; break;
     case POLISH: values = POLISH_VALUES; break;
+    case CENTRE:
     case RESHAPE: return left;
     }
     wanted = STEP_WORK / values > 1 ? STEP_WORK / values : 1;
@@ -269,6 +272,7 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
         random_search_polish(search, fit->iteration, count, is_last(fit, pass) ? POLISH_STEPS : 1,
                              (float)fit->options.stages.randoms.hold, context);
         return GROOM_OK;
+    case CENTRE:
     case RESHAPE: break;
     }
     return GROOM_EINTERNAL;
@@ -295,27 +299,28 @@ static void centre_scale(struct groom *groom, struct groom_operator *op)
     }
 }
 
-static groom_status reshape_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+static groom_status centre_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     struct groom *groom = fit->groom;
     groom_status st = clumps(groom) ? bundles_centre(fit, context, diag) : GROOM_OK;
     for (uint32_t o = 0; st == GROOM_OK && o < groom->n_operators; o++)
         if (groom->operators[o].type == GROOM_OPERATOR_SCALE && has_effect(&groom->operators[o]))
             centre_scale(groom, &groom->operators[o]);
-    if (st == GROOM_OK)
-        st = guides_refine(fit, context, diag);
-    if (st == GROOM_OK)
-        st = operators_refine(fit, fit->options.stages.randoms.refinements, context, diag);
-    if (st == GROOM_OK)
-        fit->iteration++;
     return st;
 }
 
-static groom_status search_step(struct groom_fit *fit, const struct pass *pass, const struct groom_context *context,
-                                struct groom_diag *diag)
+static groom_status reshape_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    groom_status st = guides_refine(fit, context, diag);
+    if (st == GROOM_OK)
+        st = operators_refine(fit, fit->options.stages.randoms.refinements, context, diag);
+    return st;
+}
+
+static groom_status search_step(struct groom_fit *fit, const struct pass *pass, uint32_t count,
+                                const struct groom_context *context, struct groom_diag *diag)
 {
     struct random_search search;
-    uint32_t count = step_size(fit, pass);
     groom_status st = random_search_init(&search, fit, context, diag);
     if (st == GROOM_OK) {
         search.leave_out = leave_out(fit, pass);
@@ -323,6 +328,17 @@ static groom_status search_step(struct groom_fit *fit, const struct pass *pass, 
         st = search_pass(fit, &search, pass, count, context, diag);
     }
     random_search_finish(&search);
+    return st;
+}
+
+/* The next strands, operator guides or all guides of a pass. */
+static groom_status pass_step(struct groom_fit *fit, const struct pass *pass, const struct groom_context *context,
+                              struct groom_diag *diag)
+{
+    uint32_t count = step_size(fit, pass);
+    groom_status st = pass->kind == CENTRE    ? centre_step(fit, context, diag)
+                      : pass->kind == RESHAPE ? reshape_step(fit, context, diag)
+                                              : search_step(fit, pass, count, context, diag);
     if (st == GROOM_OK)
         fit->iteration += count;
     return st;
@@ -408,8 +424,7 @@ groom_status randoms_step(struct groom_fit *fit, int *ended, const struct groom_
             st = report_losses(fit, 0, context, diag);
         fit->phase += st == GROOM_OK;
     } else if (fit->iteration < size_of(fit, &passes[fit->phase - 1])) {
-        st = passes[fit->phase - 1].kind == RESHAPE ? reshape_step(fit, context, diag)
-                                                    : search_step(fit, &passes[fit->phase - 1], context, diag);
+        st = pass_step(fit, &passes[fit->phase - 1], context, diag);
     } else {
         int last = fit->phase == n || passes[fit->phase].round != passes[fit->phase - 1].round;
         if (last)

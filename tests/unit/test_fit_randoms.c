@@ -205,6 +205,32 @@ static void same_grooms(const struct groom *a, const struct groom *b)
     ck_assert_mem_eq(a->operator_guide_of, b->operator_guide_of, n * sizeof(uint32_t));
 }
 
+/* Guides that are too short would have all strands scaled up. */
+START_TEST(what_scales_have_in_common_goes_to_the_guides)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_BENT, 200, M, 3, NULL);
+    struct groom_fit *fit = fit_of(sample, 2);
+    struct groom *groom = fit->groom;
+    double mean = 0, length = 0, right = 0;
+    for (uint32_t g = 0; g < groom->n_guides; g++)
+        for (uint32_t j = 1; j < M; j++)
+            for (int c = 0; c < 3; c++)
+                groom->guides[g * M + j][c] += 0.05f * (groom->guides[g * M][c] - groom->guides[g * M + j][c]);
+    finish(fit, NULL);
+    for (uint32_t i = 0; i < groom->n_strands; i++)
+        mean += (double)groom->operators[0].random[0][i] / groom->n_strands;
+    for (uint32_t g = 0; g < groom->n_guides; g++) {
+        length += groom_polyline_length((const float (*)[3])(groom->guides + (size_t)g * M), M);
+        right += groom_polyline_length((const float (*)[3])(sample->truth->guides + (size_t)g * M), M);
+    }
+    ck_assert_int_eq(groom->operators[0].type, GROOM_OPERATOR_SCALE);
+    ck_assert_double_lt(fabs(mean), 0.1);
+    ck_assert_double_eq_tol(length / right, 1, 0.015);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
 START_TEST(the_stage_has_the_same_bits_for_any_threads)
 {
     struct groom_sample *sample = guides_sample(GROOM_SAMPLE_WAVY, 220, M, 3, NULL);
@@ -412,7 +438,7 @@ TEST_SUITE("fit_randoms", the_error_is_none_on_the_same_curve_however_its_vertic
            the_error_has_the_same_bits_in_all_variants, the_losses_are_those_of_their_equation,
            numbers_of_bent_hair_are_found, numbers_of_spiky_hair_are_found, numbers_of_curls_are_found,
            guides_of_straight_hair_follow_known_numbers, guides_of_wavy_hair_follow_known_numbers,
-           the_stage_has_the_same_bits_for_any_threads, the_stage_can_be_interrupted_anywhere,
+           what_scales_have_in_common_goes_to_the_guides, the_stage_has_the_same_bits_for_any_threads, the_stage_can_be_interrupted_anywhere,
            a_step_without_memory_changes_nothing, no_rounds_leave_the_numbers_as_they_were_drawn,
            the_papers_gradient_is_that_of_its_loss, the_papers_steps_go_down,
            the_papers_steps_can_be_interrupted_and_know_no_threads, the_papers_steps_without_memory_change_nothing)
