@@ -46,18 +46,29 @@ static double exact_distance(const float *a, const float *b, uint32_t d)
     return sum;
 }
 
-static uint32_t nearest_centre(const float *products, const float *half_norm, uint32_t k)
+/* Rounding of a product, as a share of |c|^2: of centres closer than that the nearest is told in double, so that
+ * the same rows rounded another way go to the same centres. */
+#define PRODUCT_ROUNDING 4e-6f
+
+static uint32_t nearest_centre(const struct lloyd *l, const float *row, const float *products)
 {
-    uint32_t best = 0;
-    float least = half_norm[0] - products[0];
-    for (uint32_t c = 1; c < k; c++) {
-        float value = half_norm[c] - products[c];
-        if (value < least) {
-            least = value;
-            best = c;
-        }
+    uint32_t best = 0, next = 0;
+    float least = INFINITY, second = INFINITY;
+    for (uint32_t c = 0; c < l->k; c++) {
+        float value = l->half_norm[c] - products[c];
+        if (value >= second)
+            continue;
+        int leads = value < least;
+        second = leads ? least : value;
+        next = leads ? best : c;
+        least = leads ? value : least;
+        best = leads ? c : best;
     }
-    return best;
+    if (second - least > PRODUCT_ROUNDING * (l->half_norm[best] + l->half_norm[next]))
+        return best;
+    double d_best = exact_distance(row, l->centres + (size_t)best * l->d, l->d);
+    double d_next = exact_distance(row, l->centres + (size_t)next * l->d, l->d);
+    return d_next < d_best || (d_next == d_best && next < best) ? next : best;
 }
 
 static void assign_piece(void *user, uint32_t piece, uint32_t thread)
@@ -74,7 +85,7 @@ static void assign_piece(void *user, uint32_t piece, uint32_t thread)
     cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)(end - begin), (int)l->k, (int)l->d, 1.0f,
                 l->x + (size_t)begin * l->d, (int)l->d, l->centres, (int)l->d, 0.0f, products, (int)l->k);
     for (uint32_t i = begin; i < end; i++) {
-        uint32_t c = nearest_centre(products + (size_t)(i - begin) * l->k, l->half_norm, l->k);
+        uint32_t c = nearest_centre(l, l->x + (size_t)i * l->d, products + (size_t)(i - begin) * l->k);
         l->nearest[i] = c;
         l->distance[i] = exact_distance(l->x + (size_t)i * l->d, l->centres + (size_t)c * l->d, l->d);
     }

@@ -1,5 +1,10 @@
+/* Each next centre is drawn with probability proportional to a row's squared distance from the centres before: by a
+ * race, in which the row with the largest of distance / E wins, E a number of an exponential distribution that the row
+ * keeps. Who wins by a little more than rounding still wins when the rows are rounded another way; of a fraction of
+ * the sum of all distances, which is the usual draw, neighbouring rows would share the rounding of all. */
 #include "geometry/kmeans.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "base/memory.h"
@@ -13,7 +18,8 @@ struct seeding {
     uint32_t n, d, n_pieces;
     float *distance;         /* [n] squared, to the nearest centre */
     uint32_t *nearest;       /* [n] which of the chosen that is */
-    double *piece_sum;       /* [n_pieces] of distance */
+    float *pace;             /* [n] */
+    uint32_t *piece_best;    /* [n_pieces] the row that leads, or n where none has a distance */
     uint32_t *chosen;
     uint32_t n_chosen;
     float *between;          /* [n_chosen] squared distance of the newest centre to each earlier one */
@@ -45,7 +51,8 @@ static void visit_piece(void *user, uint32_t piece, uint32_t thread)
     uint32_t begin = piece * ROWS_PER_PIECE;
     uint32_t end = s->n - begin < ROWS_PER_PIECE ? s->n : begin + ROWS_PER_PIECE;
     const float *newest = row(s, s->chosen[s->n_chosen - 1]);
-    double sum = 0;
+    uint32_t best = s->n;
+    float most = 0;
     (void)thread;
     for (uint32_t i = begin; i < end; i++) {
         int first = s->n_chosen == 1;
@@ -56,9 +63,13 @@ static void visit_piece(void *user, uint32_t piece, uint32_t thread)
                 s->nearest[i] = s->n_chosen - 1;
             }
         }
-        sum += s->distance[i];
+        float score = s->distance[i] * s->pace[i];
+        if (score > most) {
+            most = score;
+            best = i;
+        }
     }
-    s->piece_sum[piece] = sum;
+    s->piece_best[piece] = best;
 }
 
 static void add_centre(struct seeding *s, uint32_t i, const struct groom_context *context)
@@ -69,53 +80,23 @@ static void add_centre(struct seeding *s, uint32_t i, const struct groom_context
     parallel_for(context, s->n_pieces, visit_piece, s);
 }
 
-/* U(0,1), 53 bits: single precision could not reach every row of a large capture. */
-static double uniform53(struct groom_random_key key, uint32_t draw)
+/* 1 / E, E of an exponential distribution. */
+static void draw_paces(struct seeding *s, struct groom_random_key key)
 {
-    uint32_t block[4];
-    groom_random_block(key, 0, draw, block);
-    return (double)(((uint64_t)block[0] << 32 | block[1]) >> 11) * 0x1p-53;
+    for (uint32_t i = 0; i < s->n; i++)
+        s->pace[i] = (float)(-1 / log1p(-fmin(fmax((double)groom_random_uniform(key, i, 1), 1e-9), 1 - 1e-9)));
 }
 
-/* The piece in which *rest of the sum of all pieces lies, and what of *rest lies in it; the last one
- * with any weight where rounding leaves none; n_pieces where all weigh nothing. */
-static uint32_t draw_piece(const struct seeding *s, double *rest)
+/* The row that leads the race; n where all are at places that were chosen. */
+static uint32_t winner(const struct seeding *s)
 {
-    uint32_t last = s->n_pieces;
-    double before = 0, within = *rest;
+    uint32_t best = s->n;
     for (uint32_t p = 0; p < s->n_pieces; p++) {
-        if (s->piece_sum[p] <= 0)
-            continue;
-        last = p;
-        within = *rest - before;
-        before += s->piece_sum[p];
-        if (*rest < before)
-            break;
+        uint32_t i = s->piece_best[p];
+        if (i < s->n && (best == s->n || s->distance[i] * s->pace[i] > s->distance[best] * s->pace[best]))
+            best = i;
     }
-    *rest = within;
-    return last;
-}
-
-/* The row at a fraction u of all squared distances together; n where they are all 0. */
-static uint32_t draw_row(const struct seeding *s, double u)
-{
-    double total = 0;
-    uint32_t last = s->n;
-    for (uint32_t p = 0; p < s->n_pieces; p++)
-        total += s->piece_sum[p];
-    double rest = u * total;
-    uint32_t piece = draw_piece(s, &rest);
-    if (piece == s->n_pieces)
-        return s->n;
-    for (uint32_t i = piece * ROWS_PER_PIECE; i < s->n && i < (piece + 1) * ROWS_PER_PIECE; i++) {
-        if (s->distance[i] <= 0)
-            continue;
-        last = i;
-        rest -= s->distance[i];
-        if (rest < 0)
-            break;
-    }
-    return last;
+    return best;
 }
 
 groom_status kmeans_seed(const float *x, uint32_t n, uint32_t d, uint32_t k, struct groom_random_key key,
@@ -129,19 +110,21 @@ groom_status kmeans_seed(const float *x, uint32_t n, uint32_t d, uint32_t k, str
     s.n_pieces = (n + ROWS_PER_PIECE - 1) / ROWS_PER_PIECE;
     s.distance = memory_array(allocator, n, sizeof *s.distance);
     s.nearest = memory_array(allocator, n, sizeof *s.nearest);
-    s.piece_sum = memory_array(allocator, s.n_pieces, sizeof *s.piece_sum);
+    s.pace = memory_array(allocator, n, sizeof *s.pace);
+    s.piece_best = memory_array(allocator, s.n_pieces, sizeof *s.piece_best);
     s.between = memory_array(allocator, k, sizeof *s.between);
-    if (!s.distance || !s.nearest || !s.piece_sum || !s.between) {
+    if (!s.distance || !s.nearest || !s.pace || !s.piece_best || !s.between) {
         st = groom_fail(diag, GROOM_ENOMEM, "no memory to seed %u clusters", k);
         goto out;
     }
+    draw_paces(&s, key);
     add_centre(&s, groom_random_below(key, 0, 0, n), context);
     while (s.n_chosen < k) {
         if (progress_cancelled(context)) {
             st = groom_fail(diag, GROOM_ECANCELLED, "cancelled while clusters were seeded");
             goto out;
         }
-        uint32_t next = draw_row(&s, uniform53(key, s.n_chosen));
+        uint32_t next = winner(&s);
         if (next == n)
             break;
         add_centre(&s, next, context);
@@ -150,7 +133,8 @@ groom_status kmeans_seed(const float *x, uint32_t n, uint32_t d, uint32_t k, str
 out:
     memory_release(allocator, s.distance, n, sizeof *s.distance);
     memory_release(allocator, s.nearest, n, sizeof *s.nearest);
-    memory_release(allocator, s.piece_sum, s.n_pieces, sizeof *s.piece_sum);
+    memory_release(allocator, s.pace, n, sizeof *s.pace);
+    memory_release(allocator, s.piece_best, s.n_pieces, sizeof *s.piece_best);
     memory_release(allocator, s.between, k, sizeof *s.between);
     return st;
 }
