@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 
-#define CHECKPOINT_VERSION 4
+#define CHECKPOINT_VERSION 5
 
 struct checkpoint_header {
     char magic[8];          /* "GROOMFIT" */

@@ -25,6 +25,7 @@ enum phase { SEED, CLUSTER, GUIDES, OPERATOR_GUIDES, OPERATORS, BUNDLES, INSTANC
 #define STEP_PRODUCTS 3e10         /* multiplications of K-means in a step: about half a second on two cores */
 #define LEAST_CLUSTER 4            /* strands a guide, where the number of guides is automatic */
 #define FEW_STRANDS 16             /* so many may each be their own guide: they need not be alike */
+#define AS_NEAR 1.01f              /* squared distances that are the same but for rounding */
 #define GUIDES_PER_ROOT 4.0        /* guides for each square root of the number of strands */
 
 static uint32_t least(uint32_t a, uint32_t b) { return a < b ? a : b; }
@@ -77,7 +78,7 @@ static groom_status seed_clusters(struct groom_fit *fit, const struct groom_cont
     uint32_t wanted = least(asked == GROOM_FIT_AUTO ? automatic_guides(fit->n) : asked, fit->n);
     float *features = features_of(fit, allocator, &n_vertices);
     uint32_t *chosen = memory_array(allocator, wanted, sizeof *chosen);
-    struct groom_random_key key = {fit->options.seed, STREAM_CLUSTERS};
+    struct groom_random_key key = {FIT_OWN_SEED, STREAM_CLUSTERS};
     groom_status st;
 
     if (!features || !chosen) {
@@ -137,23 +138,27 @@ static groom_status cluster(struct groom_fit *fit, const struct groom_context *c
 
 /* --- guides ------------------------------------------------------------------------- */
 
+static float off_mean_root(const struct groom_fit *fit, uint32_t i)
+{
+    const float *root = fit->target[(size_t)i * fit->m], *mean = fit->centroids[(size_t)fit->cluster_of[i] * fit->m];
+    float x = root[0] - mean[0], y = root[1] - mean[1], z = root[2] - mean[2];
+    return x * x + y * y + z * z;
+}
+
 /* For each cluster, the strand among its own whose root is nearest to the mean root: it lends the
- * guide its root, which is on the scalp then, while the mean of roots is below it. */
+ * guide its root, which is on the scalp then, while the mean of roots is below it. Of two strands both are as near:
+ * the first one does, and rounding does not decide. */
 static void nearest_roots(const struct groom_fit *fit, uint32_t *strand_of, float *squared)
 {
     for (uint32_t g = 0; g < fit->n_guides; g++) {
         squared[g] = INFINITY;
         strand_of[g] = 0; /* no cluster is empty, unless a checkpoint was made up */
     }
-    for (uint32_t i = 0; i < fit->n; i++) {
-        uint32_t g = fit->cluster_of[i];
-        const float *root = fit->target[(size_t)i * fit->m], *mean = fit->centroids[(size_t)g * fit->m];
-        float x = root[0] - mean[0], y = root[1] - mean[1], z = root[2] - mean[2], d = x * x + y * y + z * z;
-        if (d < squared[g]) {
-            squared[g] = d;
-            strand_of[g] = i;
-        }
-    }
+    for (uint32_t i = 0; i < fit->n; i++)
+        squared[fit->cluster_of[i]] = fminf(squared[fit->cluster_of[i]], off_mean_root(fit, i));
+    for (uint32_t i = fit->n; i-- > 0;)
+        if (off_mean_root(fit, i) <= AS_NEAR * squared[fit->cluster_of[i]])
+            strand_of[fit->cluster_of[i]] = i;
 }
 
 /* The mean strand moved as a whole: the instanced strands, which take shapes from guides and roots
@@ -237,7 +242,7 @@ static groom_status choose_operator_guides(struct groom_fit *fit, const struct g
                                            struct groom_diag *diag)
 {
     struct groom *groom = fit->groom;
-    struct groom_random_key key = {fit->options.seed, STREAM_MEDOIDS};
+    struct groom_random_key key = {FIT_OWN_SEED, STREAM_MEDOIDS};
     double before, after;
     groom_status st = medoids_choose(groom->guides[0], groom->n_guides, 3 * groom->n_vertices, groom->n_operator_guides,
                                      fit->options.stages.initialize.medoid_iterations, key, context,

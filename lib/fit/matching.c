@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "fit/canonical.h"
 #include "fit/dense.h"
 #include "groom/strands.h"
 
@@ -142,7 +143,7 @@ static groom_status stratify_operators(struct groom *groom, const struct groom_a
         struct groom_operator *op = &groom->operators[o];
         uint32_t n_randoms, n = groom_operator_random_per_guide(op->type) ? groom->n_operator_guides : groom->n_strands;
         const struct groom_operator_random *randoms = groom_operator_randoms(op->type, &n_randoms);
-        groom_draw_random(groom, op, op->seed);
+        groom_draw_random(groom, op, FIT_OWN_SEED);
         for (uint32_t r = 0; r < n_randoms; r++)
             if (stratify(op->random[r], n, randoms[r].minimum == 0, allocator) != GROOM_OK)
                 return groom_fail(diag, GROOM_ENOMEM, "no memory for random numbers");
@@ -172,6 +173,14 @@ static groom_status allocate(struct matching *matching, const struct groom_conte
     matching->plan.guide = (const float (*)[3])matching->guide;
     matching->plan.bundle = matching->groom->operator_guide_of;
     return GROOM_OK;
+}
+
+/* The statistics know no axes, the model does; and floats are finest near the middle of the hair. */
+static void move_groom(struct groom *groom, const struct groom_fit *fit)
+{
+    size_t n_points = (size_t)groom->n_guides * groom->n_vertices;
+    canonical_move(fit->frame, fit->centre, groom->guides, n_points);
+    canonical_move(fit->frame, fit->centre, groom->roots, groom->n_strands);
 }
 
 static groom_status make_base(struct matching *matching, const struct groom_context *context, struct groom_diag *diag)
@@ -205,8 +214,8 @@ static groom_status measure_target(struct matching *matching, const struct groom
     for (uint32_t i = 0; i < 2 * n_pairs; i++)
         for (uint32_t j = 0; j < m; j++)
             for (int c = 0; c < 3; c++)
-                matching->points[(size_t)i * m + j][c] =
-                    fit->target[(size_t)strand[i] * m + j][c] * fit->scale + fit->centre[c];
+                matching->points[(size_t)i * m + j][c] = fit->target[(size_t)strand[i] * m + j][c] * fit->scale;
+    canonical_move(fit->frame, (const float[3]){0, 0, 0}, matching->points, points_of(matching));
     for (int round = 0; round < 3; round++) { /* each with the levels, then the peak's phase, that were found before */
         moments_measure(&matching->plan, (const float (*)[3])matching->points, matching->values, context);
         moments_mean(matching->values, n_pairs, matching->target);
@@ -235,8 +244,10 @@ groom_status matching_create(const struct groom_fit *fit, uint32_t n_pairs, doub
     if (st != GROOM_OK)
         goto out;
     if ((st = choose_pairs(fit, n, strand, context, diag)) != GROOM_OK ||
-        (st = groom_select(fit->groom, strand, 2 * n, context, &matching->groom, diag)) != GROOM_OK ||
-        (st = stratify_operators(matching->groom, allocator, diag)) != GROOM_OK ||
+        (st = groom_select(fit->groom, strand, 2 * n, context, &matching->groom, diag)) != GROOM_OK)
+        goto out;
+    move_groom(matching->groom, fit);
+    if ((st = stratify_operators(matching->groom, allocator, diag)) != GROOM_OK ||
         (st = allocate(matching, context, diag)) != GROOM_OK ||
         (st = make_base(matching, context, diag)) != GROOM_OK ||
         (st = measure_target(matching, fit, strand, floor, context, diag)) != GROOM_OK)

@@ -20,7 +20,7 @@
 #define FIRST_PHASE_WINDOW 2    /* the second on: curls often set in later than at the root */
 #define LEAST_PHASE_TURNS 3.0   /* of a strand, in the windows of phases */
 #define NYQUIST_SHARE 0.45      /* of a turn a segment */
-#define POWER_FLOOR 1e-8        /* of squared segments: a wobble of 1e-4 rad */
+#define POWER_FLOOR 1e-5        /* of squared segments: a wobble of 3e-3 rad; rounding is far below it */
 #define DISTANCE_FLOOR 1e-8     /* of squared lengths */
 #define SHRINKAGE 0.1           /* of correlations */
 #define GUIDE_FLOOR 10.0               /* times the floor, for statistics that lean on base strands and operator guides: they only

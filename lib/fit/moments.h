@@ -22,7 +22,8 @@
  * Differences within pairs do not lean on the guides: what is wrong with these is much the same for neighbours,
  * and cancels.
  *
- * Logarithms and absolute deviations keep a few odd strands from deciding. Nothing depends on the unit. */
+ * Logarithms and absolute deviations keep a few odd strands from deciding. Nothing depends on the unit,
+ * nor on the axes. */
 #ifndef FIT_MOMENTS_H
 #define FIT_MOMENTS_H
 

@@ -37,13 +37,14 @@ enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 #define FLOOR_FIRST 0.3        /* of the statistics in the first step, and how it falls to the last */
 #define FLOOR_RATIO 0.5
 #define FLOOR_LAST 0.01
-#define PROBE 0.03             /* step of a finite difference, in logarithms or fractions of a strand */
+#define PROBE 0.03             /* step of a finite difference of a frequency's logarithm or a fraction of a strand */
+#define PROBE_SIZE 0.1         /* of the logarithm of a size: wide, so that rounding of strands does not show in a slope */
 #define LONGEST_STEP 0.7       /* of a parameter in one step of refinement */
 #define LONGEST_START 0.2      /* the same of where a bend or curl sets in */
 #define DAMPING_FLOOR 0.1      /* keeps parameters that nothing speaks for where they are */
 #define LEAST_TURNS 1.0        /* of a curl over a guide: less is a shift that all strands of an operator guide
                                 * share, which shows as patches, most of all in short hair */
-#define CONVERGED 1e-3         /* share of the misfit that a step must gain */
+#define CONVERGED 1e-3       /* share of the misfit that a step must gain */
 #define MOST_PARAMETERS (GROOM_FIT_MAX_OPERATORS * GROOM_OPERATOR_MAX_PARAMETERS)
 
 /* --- parameters --------------------------------------------------------------------------- */
@@ -202,12 +203,13 @@ static groom_status differentiate(struct matching *matching, struct trial *trial
     for (uint32_t k = 0; k < trial->n_unknowns; k++) {
         const struct unknown *unknown = &trial->unknowns[k];
         double *column = jacobian + (size_t)k * MOMENTS_COUNT, x = read_unknown(unknown), step;
+        double probe = unknown->logarithmic && !unknown->frequency ? PROBE_SIZE : PROBE;
         float kept = *unknown->value;
         if (progress_cancelled(context))
             return groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage operators");
-        write_unknown(unknown, x + PROBE);
+        write_unknown(unknown, x + probe);
         if (read_unknown(unknown) <= x) /* at its end: look the other way */
-            write_unknown(unknown, x - PROBE);
+            write_unknown(unknown, x - probe);
         step = read_unknown(unknown) - x;
         groom_status st = matching_residual(matching, trial->operators, column, context, diag);
         *unknown->value = kept;

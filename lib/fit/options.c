@@ -19,7 +19,7 @@ const struct option_row options_table[] = {
     {"/interpolation_guides", OPTION_U32, AT(interpolation_guides), ALL(3), 1, 16,
      "Guides that each strand blends."},
     {"/seed", OPTION_U64, AT(seed), ALL(1), 0, 999999999999999.0,
-     "Seed of every random number of the fit and of the groom."},
+     "Seed of the groom's random numbers. What the fit estimates with draws of its own does not depend on it."},
     {"/quality", OPTION_QUALITY, AT(quality), {0, 1, 2}, 0, 2,
      "How much work to spend: sets the defaults of the stages."},
     {"/visibility", OPTION_GROUP_OR_NULL, 0, ALL(0), 0, 0,

@@ -8,6 +8,10 @@
 #include "groom/scalp.h"
 #include "groom/spatial.h"
 
+/* What draws to estimate uses this seed in place of the options', which decides a groom's random numbers alone:
+ * how well a fit goes is no lottery. (The paper's own gradient steps go by the options'.) */
+#define FIT_OWN_SEED 1u
+
 struct groom_fit {
     const struct groom_allocator *allocator;
     struct groom_fit_options options;
@@ -22,6 +26,7 @@ struct groom_fit {
     float (*target)[3];        /* [n * m] (position - centre) / scale */
     float centre[3];           /* of all points, metres */
     float scale;               /* metres: root mean square distance of all points from the centre */
+    double frame[3][3];        /* the hair's own axes, rows (canonical.h) */
     float ordinary;            /* size of this scalp over that of an ordinary one: 1 for real hair in metres */
     struct {                   /* every strand of the capture, where cameras see some only (unseen.h); else 0 */
         uint32_t n;

@@ -5,6 +5,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/progress.h"
+#include "fit/canonical.h"
 #include "fit/head_frame.h"
 #include "fit/outliers.h"
 #include "fit/refine.h"
@@ -326,6 +327,7 @@ static groom_status fill_target(struct groom_fit *fit, const struct groom_strand
     if (progress_cancelled(context))
         return groom_fail(diag, GROOM_ECANCELLED, "cancelled while the target was prepared");
     normalize_target(fit, outlier, context);
+    canonical_frame(fit, outlier, fit->frame);
     note_joins(fit);
     return GROOM_OK;
 }
