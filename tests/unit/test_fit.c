@@ -9,6 +9,7 @@
 #include "groom/random.h"
 #include "groom/sample.h"
 #include "groom/strands.h"
+#include "tests/support/fits.h"
 #include "tests/support/test.h"
 
 /* --- inputs ---------------------------------------------------------------------- */
@@ -213,32 +214,6 @@ END_TEST
 
 /* --- checkpoints ------------------------------------------------------------------------ */
 
-struct file { unsigned char *bytes; size_t n, room; };
-
-static groom_status append(void *user, const void *bytes, size_t n)
-{
-    struct file *file = user;
-    if (file->n + n > file->room)
-        file->bytes = realloc(file->bytes, file->room = 2 * (file->n + n));
-    memcpy(file->bytes + file->n, bytes, n);
-    file->n += n;
-    return GROOM_OK;
-}
-
-static struct file saved(const struct groom_fit *fit)
-{
-    struct file file = {0};
-    ck_ok(groom_fit_save(fit, (struct groom_sink){append, &file}, NULL));
-    return file;
-}
-
-static groom_status load(struct groom_fit *fit, const struct file *file, struct groom_diag *diag)
-{
-    struct groom_memory_source state;
-    struct groom_source source = groom_source_from_memory(&state, file->bytes, file->n);
-    return groom_fit_load(fit, &source, NULL, diag);
-}
-
 START_TEST(a_fit_taken_up_after_any_step_ends_with_the_same_bits)
 {
     struct groom_sample *sample = sample_of(GROOM_SAMPLE_WAVY, 250, 1);
@@ -247,9 +222,9 @@ START_TEST(a_fit_taken_up_after_any_step_ends_with_the_same_bits)
     struct groom_fit *fit = fit_of(sample->capture, sample->head, &options, NULL);
     struct groom *whole = groom_of(sample->capture, sample->head, &options, NULL), *groom;
     for (int step = 0;; step++) {
-        struct file file = saved(fit);
+        struct fits_state file = fits_save(fit);
         struct groom_fit *other = fit_of(sample->capture, sample->head, &options, NULL);
-        ck_ok(load(other, &file, NULL));
+        ck_ok(fits_load(other, &file, NULL));
         ck_assert_int_eq(groom_fit_done(other), groom_fit_done(fit));
         run(other, NULL);
         ck_ok(groom_fit_result(other, NULL, &groom, NULL));
@@ -272,9 +247,9 @@ START_TEST(a_checkpoint_may_be_loaded_over_a_later_state)
     struct groom_sample *sample = sample_of(GROOM_SAMPLE_STRAIGHT, 100, 0);
     struct groom_fit_options options = options_of(10, 3, 12);
     struct groom_fit *fit = fit_of(sample->capture, NULL, &options, NULL);
-    struct file file = saved(fit);
+    struct fits_state file = fits_save(fit);
     run(fit, NULL);
-    ck_ok(load(fit, &file, NULL));
+    ck_ok(fits_load(fit, &file, NULL));
     ck_assert_int_eq(groom_fit_done(fit), 0);
     run(fit, NULL);
     free(file.bytes);
@@ -290,29 +265,29 @@ START_TEST(a_checkpoint_of_something_else_is_refused_and_changes_nothing)
     struct groom_fit *fit = fit_of(sample->capture, sample->head, &options, NULL);
     ck_ok(groom_fit_step(fit, NULL, NULL));
     ck_ok(groom_fit_step(fit, NULL, NULL));
-    struct file file = saved(fit);
+    struct fits_state file = fits_save(fit);
     struct groom_diag diag = {0};
 
     options.seed = 9;
     struct groom_fit *other = fit_of(sample->capture, sample->head, &options, NULL);
-    ck_status(load(other, &file, &diag), GROOM_ECONFLICT);
+    ck_status(fits_load(other, &file, &diag), GROOM_ECONFLICT);
     groom_fit_destroy(other);
     options.seed = 1;
     other = fit_of(sample->capture, NULL, &options, NULL);
-    ck_status(load(other, &file, &diag), GROOM_ECONFLICT);
+    ck_status(fits_load(other, &file, &diag), GROOM_ECONFLICT);
     groom_fit_destroy(other);
 
     for (size_t at = 0; at < file.n; at += at < 200 ? 1 : 61) { /* one bit over */
         file.bytes[at] ^= 0x10;
-        groom_status st = load(fit, &file, &diag);
+        groom_status st = fits_load(fit, &file, &diag);
         ck_assert_msg(st == GROOM_EFORMAT || st == GROOM_ECONFLICT || st == GROOM_ETRUNCATED, "%zu", at);
         file.bytes[at] ^= 0x10;
     }
     size_t n = file.n;
     for (file.n = 0; file.n < n; file.n += file.n < 200 ? 1 : 97)
-        ck_status(load(fit, &file, &diag), GROOM_ETRUNCATED);
+        ck_status(fits_load(fit, &file, &diag), GROOM_ETRUNCATED);
     file.n = n;
-    ck_ok(load(fit, &file, &diag));
+    ck_ok(fits_load(fit, &file, &diag));
     run(fit, NULL);
     free(file.bytes);
     groom_fit_destroy(fit);

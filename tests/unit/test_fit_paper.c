@@ -12,6 +12,7 @@
 #include "fit/paper_operators.h"
 #include "groom/strands.h"
 #include "quality/sort.h"
+#include "tests/support/fits.h"
 #include "tests/support/guides.h"
 #include "tests/support/test.h"
 
@@ -37,16 +38,6 @@ static struct groom_fit_options paper_options(const struct groom_sample *sample)
     options.stages.operators.batch_fraction = 0.1;
     options.stages.randoms.rounds = 0;
     return options;
-}
-
-static const struct groom_fit_loss *loss_of(const struct groom_fit *fit, const char *stage, const char *name)
-{
-    const struct groom_fit_report *report = groom_fit_get_report(fit);
-    for (uint32_t i = 0; i < report->n_losses; i++)
-        if (strcmp(report->losses[i].stage, stage) == 0 && strcmp(report->losses[i].name, name) == 0)
-            return &report->losses[i];
-    ck_abort_msg("no loss %s of stage %s", name, stage);
-    return NULL;
 }
 
 /* --- gradients ----------------------------------------------------------------------------- */
@@ -210,8 +201,8 @@ START_TEST(steps_go_down)
     options.stages.guides.iterations = 200;
     options.stages.operators.iterations = 60;
     struct groom_fit *fit = guides_fit(sample, &options, "", NULL);
-    const struct groom_fit_loss *weights = loss_of(fit, "instance_weights", "L_x"), *guides = loss_of(fit, "guides", "L_g");
-    const struct groom_fit_loss *shape = loss_of(fit, "operators", "shape");
+    const struct groom_fit_loss *weights = fits_loss(fit, "instance_weights", "L_x"), *guides = fits_loss(fit, "guides", "L_g");
+    const struct groom_fit_loss *shape = fits_loss(fit, "operators", "shape");
     ck_assert_double_lt(weights->after, 0.8 * weights->before);
     ck_assert_double_lt(guides->after, 0.9 * guides->before);
     ck_assert_double_lt(shape->after, shape->before);
@@ -231,17 +222,6 @@ static void same_grooms(const struct groom *a, const struct groom *b)
         ck_assert_mem_eq(a->operators[o].parameter, b->operators[o].parameter, sizeof a->operators[o].parameter);
 }
 
-struct bytes { unsigned char *at; size_t n; };
-
-static groom_status append(void *user, const void *from, size_t n)
-{
-    struct bytes *bytes = user;
-    bytes->at = realloc(bytes->at, bytes->n + n);
-    memcpy(bytes->at + bytes->n, from, n);
-    bytes->n += n;
-    return GROOM_OK;
-}
-
 /* 4 000 strands: 25 gradients of guides a step and 5 of operators. */
 START_TEST(steps_can_be_interrupted_anywhere_and_know_no_threads)
 {
@@ -256,17 +236,10 @@ START_TEST(steps_can_be_interrupted_anywhere_and_know_no_threads)
     ck_ok(groom_pool_create(3, &context.pool));
     struct groom_fit *whole = guides_fit(sample, &options, "", &context), *other = guides_fit(sample, &options, "instance_weights", NULL);
     for (; !groom_fit_done(other); steps++) {
-        struct bytes bytes = {0};
-        struct groom_memory_source memory;
         struct groom_fit *next;
         ck_ok(groom_fit_step(other, NULL, NULL));
-        ck_ok(groom_fit_save(other, (struct groom_sink){append, &bytes}, NULL));
-        struct groom_source source = groom_source_from_memory(&memory, bytes.at, bytes.n);
         ck_ok(groom_fit_create(sample->capture, sample->head, &options, NULL, &next, NULL));
-        ck_ok(groom_fit_load(next, &source, NULL, NULL));
-        groom_fit_destroy(other);
-        other = next;
-        free(bytes.at);
+        other = fits_pass_on(other, next);
     }
     ck_assert_int_gt(steps, 10);
     same_grooms(whole->groom, other->groom);
@@ -282,21 +255,9 @@ START_TEST(a_step_without_memory_changes_nothing)
 {
     struct groom_sample *sample = guides_sample(GROOM_SAMPLE_STRAIGHT, 80, M, 3, NULL);
     struct groom_fit_options options = paper_options(sample);
-    struct test_failing_allocator state;
-    struct groom_allocator allocator;
-    struct groom_context context = {.allocator = &allocator};
-    size_t fail_at = 0, failures = 0;
     options.stages.guides.iterations = options.stages.operators.iterations = 2;
     struct groom_fit *whole = guides_fit(sample, &options, "", NULL), *poor = guides_fit(sample, &options, "instance_weights", NULL);
-    while (!groom_fit_done(poor)) {
-        test_failing_allocator_init(&state, fail_at, &allocator);
-        groom_status st = groom_fit_step(poor, &context, NULL);
-        ck_assert_uint_eq(state.outstanding_bytes, 0);
-        ck_assert(st == GROOM_OK || st == GROOM_ENOMEM);
-        failures += st != GROOM_OK;
-        fail_at = st == GROOM_OK ? 0 : fail_at + 1;
-    }
-    ck_assert_uint_gt(failures, 40);
+    ck_assert_uint_gt(fits_finish_without_memory(poor), 40);
     same_grooms(whole->groom, poor->groom);
     groom_fit_destroy(whole);
     groom_fit_destroy(poor);

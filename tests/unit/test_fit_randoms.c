@@ -10,6 +10,7 @@
 #include "fit/strand_error.h"
 #include "groom/random.h"
 #include "groom/strands.h"
+#include "tests/support/fits.h"
 #include "tests/support/guides.h"
 #include "tests/support/test.h"
 
@@ -114,16 +115,6 @@ static void finish(struct groom_fit *fit, const struct groom_context *context)
         ck_ok(groom_fit_step(fit, context, NULL));
 }
 
-static const struct groom_fit_loss *loss_of(const struct groom_fit *fit, const char *name)
-{
-    const struct groom_fit_report *report = groom_fit_get_report(fit);
-    for (uint32_t i = 0; i < report->n_losses; i++)
-        if (strcmp(report->losses[i].stage, "randoms") == 0 && strcmp(report->losses[i].name, name) == 0)
-            return &report->losses[i];
-    ck_abort_msg("no loss %s", name);
-    return NULL;
-}
-
 static struct groom_context three_threads(void)
 {
     struct groom_context context = {0};
@@ -138,7 +129,8 @@ static void finds(groom_sample_style style, double direction, double vertex)
     struct groom_sample *sample = guides_sample(style, 600, M, 3, &context);
     struct groom_fit *fit = fit_of(sample, 2);
     finish(fit, &context);
-    const struct groom_fit_loss *d = loss_of(fit, "direction"), *x = loss_of(fit, "vertex"), *all = loss_of(fit, "L_rand");
+    const struct groom_fit_loss *d = fits_loss(fit, "randoms", "direction"), *x = fits_loss(fit, "randoms", "vertex");
+    const struct groom_fit_loss *all = fits_loss(fit, "randoms", "L_rand");
     ck_assert_msg(d->after < direction * d->before, "direction %g of %g", d->after, d->before);
     ck_assert_msg(x->after < vertex * x->before, "vertex %g of %g", x->after, x->before);
     ck_assert_double_lt(all->after, 0.5 * all->before);
@@ -247,17 +239,6 @@ START_TEST(the_stage_has_the_same_bits_for_any_threads)
 }
 END_TEST
 
-struct bytes { unsigned char *at; size_t n; };
-
-static groom_status append(void *user, const void *from, size_t n)
-{
-    struct bytes *bytes = user;
-    bytes->at = realloc(bytes->at, bytes->n + n);
-    memcpy(bytes->at + bytes->n, from, n);
-    bytes->n += n;
-    return GROOM_OK;
-}
-
 /* After each of its steps saved, and taken up by a fit that has done nothing. */
 START_TEST(the_stage_can_be_interrupted_anywhere)
 {
@@ -267,17 +248,10 @@ START_TEST(the_stage_can_be_interrupted_anywhere)
     whole->options.stages.randoms.refinements = other->options.stages.randoms.refinements = 1;
     finish(whole, NULL);
     for (; !groom_fit_done(other); steps++) {
-        struct bytes bytes = {0};
-        ck_ok(groom_fit_step(other, NULL, NULL));
-        ck_ok(groom_fit_save(other, (struct groom_sink){append, &bytes}, NULL));
-        struct groom_memory_source memory;
-        struct groom_source source = groom_source_from_memory(&memory, bytes.at, bytes.n);
         struct groom_fit *next = fit_of(sample, 2);
         next->options.stages.randoms.refinements = 1;
-        ck_ok(groom_fit_load(next, &source, NULL, NULL));
-        groom_fit_destroy(other);
-        other = next;
-        free(bytes.at);
+        ck_ok(groom_fit_step(other, NULL, NULL));
+        other = fits_pass_on(other, next);
     }
     ck_assert_int_gt(steps, 5);
     same_grooms(whole->groom, other->groom);
@@ -291,20 +265,8 @@ START_TEST(a_step_without_memory_changes_nothing)
 {
     struct groom_sample *sample = guides_sample(GROOM_SAMPLE_WAVY, 100, M, 3, NULL);
     struct groom_fit *whole = fit_of(sample, 1), *poor = fit_of(sample, 1);
-    struct test_failing_allocator state;
-    struct groom_allocator allocator;
-    struct groom_context context = {.allocator = &allocator};
-    size_t fail_at = 0, failures = 0;
     finish(whole, NULL);
-    while (!groom_fit_done(poor)) {
-        test_failing_allocator_init(&state, fail_at, &allocator);
-        groom_status st = groom_fit_step(poor, &context, NULL);
-        ck_assert_uint_eq(state.outstanding_bytes, 0);
-        failures += st != GROOM_OK;
-        ck_assert(st == GROOM_OK || st == GROOM_ENOMEM);
-        fail_at = st == GROOM_OK ? 0 : fail_at + 1;
-    }
-    ck_assert_uint_gt(failures, 20);
+    ck_assert_uint_gt(fits_finish_without_memory(poor), 20);
     same_grooms(whole->groom, poor->groom);
     groom_fit_destroy(whole);
     groom_fit_destroy(poor);
@@ -375,7 +337,7 @@ START_TEST(the_papers_steps_go_down)
     struct groom_sample *sample = guides_sample(GROOM_SAMPLE_BENT, 60, M, 3, NULL);
     struct groom_fit *fit = paper_fit(sample, 150);
     finish(fit, NULL);
-    ck_assert_double_lt(loss_of(fit, "L_rand")->after, 0.6 * loss_of(fit, "L_rand")->before);
+    ck_assert_double_lt(fits_loss(fit, "randoms", "L_rand")->after, 0.6 * fits_loss(fit, "randoms", "L_rand")->before);
     ck_assert_uint_eq(fit->n_moments, 0);
     ck_ok(groom_validate(fit->groom, NULL));
     groom_fit_destroy(fit);
@@ -389,22 +351,15 @@ START_TEST(the_papers_steps_can_be_interrupted_and_know_no_threads)
     struct groom_sample *sample = guides_sample(GROOM_SAMPLE_SHORT, 2000, 12, 3, NULL);
     struct groom_fit *whole = paper_fit(sample, 50), *other = paper_fit(sample, 50);
     struct groom_context context = three_threads();
-    struct bytes bytes = {0};
-    struct groom_memory_source memory;
     finish(whole, &context);
     for (int steps = 0; steps < 2; steps++) /* a measurement, and the first 30 */
         ck_ok(groom_fit_step(other, NULL, NULL));
     ck_assert_uint_eq(other->iteration, 30);
-    ck_ok(groom_fit_save(other, (struct groom_sink){append, &bytes}, NULL));
-    struct groom_source source = groom_source_from_memory(&memory, bytes.at, bytes.n);
-    struct groom_fit *next = paper_fit(sample, 50);
-    ck_ok(groom_fit_load(next, &source, NULL, NULL));
-    finish(next, NULL);
-    same_grooms(whole->groom, next->groom);
-    free(bytes.at);
+    other = fits_pass_on(other, paper_fit(sample, 50));
+    finish(other, NULL);
+    same_grooms(whole->groom, other->groom);
     groom_fit_destroy(whole);
     groom_fit_destroy(other);
-    groom_fit_destroy(next);
     groom_sample_destroy(sample);
     groom_pool_destroy(context.pool);
 }
@@ -414,19 +369,8 @@ START_TEST(the_papers_steps_without_memory_change_nothing)
 {
     struct groom_sample *sample = guides_sample(GROOM_SAMPLE_STRAIGHT, 40, M, 3, NULL);
     struct groom_fit *whole = paper_fit(sample, 3), *poor = paper_fit(sample, 3);
-    struct test_failing_allocator state;
-    struct groom_allocator allocator;
-    struct groom_context context = {.allocator = &allocator};
-    size_t fail_at = 0, failures = 0;
     finish(whole, NULL);
-    while (!groom_fit_done(poor)) {
-        test_failing_allocator_init(&state, fail_at, &allocator);
-        groom_status st = groom_fit_step(poor, &context, NULL);
-        ck_assert_uint_eq(state.outstanding_bytes, 0);
-        failures += st != GROOM_OK;
-        fail_at = st == GROOM_OK ? 0 : fail_at + 1;
-    }
-    ck_assert_uint_gt(failures, 10);
+    ck_assert_uint_gt(fits_finish_without_memory(poor), 10);
     same_grooms(whole->groom, poor->groom);
     groom_fit_destroy(whole);
     groom_fit_destroy(poor);
