@@ -34,7 +34,7 @@ run_unit() {
         case $program in *.d|*.o) continue ;; esac
         [ -x "$program" ] && ! too_slow "${program##*/}" || continue
         named=$(named_tests "${program##*/}")
-        run "${program##*/}" env ${named:+TESTS_NAMED=$named} ${VARIANT:+timeout "${SUITE_SECONDS:-1800}"} "$program"
+        run "${program##*/}" env ${named:+TESTS_NAMED=$named} ${VARIANT:+CK_TIMEOUT_MULTIPLIER=8 timeout "${SUITE_SECONDS:-2400}"} "$program"
     done
     for program in "$BUILD"/tests/fuzz/replay_*; do
         corpus=tests/fuzz/corpus/${program##*/replay_}

@@ -130,7 +130,8 @@ struct trial {
 static void trial_init(const struct groom_fit *fit, struct trial *trial)
 {
     trial->n_operators = fit->groom->n_operators;
-    memcpy(trial->operators, fit->groom->operators, trial->n_operators * sizeof *trial->operators);
+    if (trial->n_operators) /* of none there is no array to copy */
+        memcpy(trial->operators, fit->groom->operators, trial->n_operators * sizeof *trial->operators);
     trial->n_unknowns = list_unknowns(trial->operators, trial->n_operators, fit->ordinary,
                                       mean_guide_length(fit->groom), trial->unknowns);
 }

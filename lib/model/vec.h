@@ -112,7 +112,7 @@ LANES_INLINE vec vec_inverse(vec x)
 LANES_INLINE vec vec_exp2_near(vec x)
 {
     vec rounded = x + ROUNDER, r = x - (rounded - ROUNDER), z = r * r;
-    return (vec)((ivec)EXP2_POLYNOMIAL(r, z) + (ivec)((uvec)rounded << 23));
+    return (vec)((uvec)EXP2_POLYNOMIAL(r, z) + ((uvec)rounded << 23)); /* as in lanes.h: the rounder's own bits leave */
 }
 
 LANES_INLINE vec vec_exp2(vec x) { return vec_exp2_near(vec_at_least(x, -126.0f)); }

@@ -189,7 +189,8 @@ static groom_status evaluate(const struct carrying *c, const struct groom *groom
                              struct groom_strands *dense)
 {
     struct groom view = *groom;
-    memcpy(operators, groom->operators, groom->n_operators * sizeof *operators);
+    if (groom->n_operators) /* of none there is no array to copy */
+        memcpy(operators, groom->operators, groom->n_operators * sizeof *operators);
     for (uint32_t i = 0; i < groom->n_operators; i++)
         operators[i].enabled = operators[i].enabled && !groom_operator_is_layer(operators[i].type);
     view.operators = operators;
