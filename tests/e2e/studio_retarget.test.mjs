@@ -3,7 +3,7 @@ import test from 'node:test';
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { slowness, startDaemon } from '../support/daemon.mjs';
+import { sharedData, slowness, startDaemon, temporaryFolder } from '../support/daemon.mjs';
 import { picture, startBrowser } from '../support/browser.mjs';
 import { decode } from '../support/api.mjs';
 import { drawn, sample, settled, skip } from '../support/studio.mjs';
@@ -143,6 +143,27 @@ test('a hairline is dragged on the head, moved by arrows, and carried', { skip, 
     assert.deepEqual(await handles(), first);
     await page.getByText('Not moved').waitFor();
   });
+  await t.test('and goes back towards today’s by quarters', async () => {
+    await page.getByRole('button', { name: 'widow’s peak' }).click();
+    const far = await handles();
+    await page.getByRole('button', { name: 'closer to today’s' }).click();
+    const near = await handles(), left = near.map((p, i) => apart(p, first[i]) / apart(far[i], first[i]));
+    for (const i of [3, 5, 7]) assert.ok(left[i] > 0.65 && left[i] < 0.85, `${left}`);
+    await page.getByRole('button', { name: 'as it is', exact: true }).click();
+    assert.ok(await page.getByRole('button', { name: 'closer to today’s' }).isDisabled(), 'today’s is as close as it gets');
+  });
+  await t.test('what lies between handles keeps its shape', async () => {
+    const [off, moved] = await page.evaluate(() => {
+      const { editor } = window.studio, of = (points) => points.map((p, i) => p.distanceTo(editor.line[i]));
+      const still = Math.max(...of(editor.points));
+      editor.move(5, editor.handles[5].clone().add({ x: 0, y: -0.006, z: 0 }));
+      const by = of(editor.points);
+      editor.take('as it is');
+      return [still, by];
+    });
+    assert.ok(off < 1e-6, 'nothing moved: the line is today’s, point by point');
+    assert.ok(moved[20] > 0.003 && moved[0] < 1e-6 && moved[10] < moved[20] / 4, `${moved}`);
+  });
   await t.test('in a narrow window too', async () => {
     await page.setViewportSize({ width: 420, height: 800 });
     await page.waitForTimeout(300);
@@ -180,4 +201,37 @@ test('a hairline is dragged on the head, moved by arrows, and carried', { skip, 
     const listed = await page.locator('.commands code').allTextContents();
     assert.ok(listed.some((line) => /^printf %s .*"points".* > hairline\.json && groomctl --server \S+ retarget str_\w+ head_\w+ --source head_\w+ --guides 60 --hairline hairline\.json$/.test(line)), listed.join('\n'));
   });
+});
+
+/** Every n-th strand of a .data file, as one. */
+function thinned(path, n) {
+  const bytes = readFileSync(path), kept = [], count = Buffer.alloc(4);
+  for (let at = 4, i = 0; at < bytes.length; i++) {
+    const size = 4 + 12 * bytes.readInt32LE(at);
+    if (i % n === 0) kept.push(bytes.subarray(at, at + size));
+    at += size;
+  }
+  count.writeInt32LE(kept.length);
+  return Buffer.concat([count, ...kept]);
+}
+
+const [jagged, body] = ['combover/hair.data', 'combover/body.obj'].map(sharedData);
+test('a jagged hairline takes a widow’s peak as a smooth one does', { skip: skip || (jagged && body ? false : 'needs ../shared/data/combover'), timeout: 180000 }, async (t) => {
+  const daemon = await startDaemon(t), folder = temporaryFolder(t), page = await startBrowser(t, daemon, { width: 1100, height: 760 });
+  writeFileSync(join(folder, 'hair.data'), thinned(jagged, 4));
+  await page.goto(daemon.url);
+  await page.locator('.drop select[name=up]').selectOption('z');
+  await page.setInputFiles('#files', [join(folder, 'hair.data'), body]);
+  await page.getByRole('link', { name: 'carry hair.data to another head' }).click();
+  await page.getByLabel('Source head').selectOption({ label: 'body.obj' });
+  await page.getByLabel('Target head').selectOption({ label: 'body.obj' });
+  await page.waitForFunction(() => window.studio?.viewer.head);
+  await page.getByRole('button', { name: 'Edit the hairline' }).click();
+  await page.waitForFunction(() => window.studio.editor.handles.length === 11);
+  await page.getByRole('button', { name: 'widow’s peak' }).click();
+  await page.waitForTimeout(300);
+  await picture(page, 'studio-hairline-jagged');
+  const document = await carried({ daemon, page });
+  assert.ok(document.retarget.hairline.edit, 'the hair follows the line');
+  await picture(page, 'studio-hairline-jagged-carried');
 });

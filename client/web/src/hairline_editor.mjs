@@ -1,12 +1,15 @@
-/* The hairline on a head: a curve through handles that are dragged along its surface. */
+/* The hairline on a head: today's line, moved by handles on it that are dragged along the surface. What lies between
+ * handles stays as it is, smoothly moved with them: a smooth line through the handles of a jagged one would fold the
+ * scalp between its teeth before anything is moved. */
 import * as THREE from 'three';
 import { say } from './dom.mjs';
 import { shaped } from './hairline_shapes.mjs';
 import { Surface } from './viewer/surface.mjs';
 
-export const HANDLES = 11;
-const BETWEEN = 4, STEP_M = 0.001, NEAR_PX = 14, HIDDEN_M = 0.01, AROUND_M = 0.12;
+const HANDLES = 11, BETWEEN = 4, LESS = 0.25, STEP_M = 0.001, NEAR_PX = 14, HIDDEN_M = 0.01, AROUND_M = 0.12;
 const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+/* Of today's line: every BETWEEN-th is a handle. */
+export const POINTS = BETWEEN * (HANDLES - 1) + 1;
 const BALL = new THREE.SphereGeometry(0.0032, 16, 12);
 
 const tube = (radius, color) => Object.assign(new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ color })), { radius });
@@ -29,10 +32,11 @@ export class HairlineEditor extends EventTarget {
         viewer.canvas.addEventListener('keydown', (event) => this.#key(event));
     }
 
-    /* The head's line of today, [[x, y, z]]; the head is the viewer's. */
+    /* The head's line of today, [POINTS] of [x, y, z]; the head is the viewer's. */
     open(front) {
-        this.first = front.map((p) => new THREE.Vector3(...p));
-        const box = new THREE.Box3().setFromPoints(this.first);
+        this.line = front.map((p) => new THREE.Vector3(...p));
+        this.first = this.line.filter((_, i) => i % BETWEEN === 0);
+        const box = new THREE.Box3().setFromPoints(this.line);
         this.surface = new Surface(this.viewer.head.geometry, box.clone().expandByScalar(AROUND_M));
         this.group.remove(...this.balls);
         this.balls = this.first.map(() => new THREE.Mesh(BALL, new THREE.MeshBasicMaterial()));
@@ -64,11 +68,20 @@ export class HairlineEditor extends EventTarget {
         this.#show();
     }
 
+    /* A quarter of the way back to today's line: what a line needs that would fold the scalp. */
+    lessen() {
+        this.handles = this.handles.map((handle, i) => {
+            const p = handle.clone().lerp(this.first[i], LESS);
+            return this.surface.closest(p) ?? p;
+        });
+        this.#show();
+    }
+
     /* The curve as it is drawn, on the surface. */
     get points() {
-        const curve = new THREE.CatmullRomCurve3(this.handles), n = BETWEEN * (this.handles.length - 1);
-        return Array.from({ length: n + 1 }, (_, i) => {
-            const p = curve.getPoint(i / n);
+        const moves = new THREE.CatmullRomCurve3(this.handles.map((handle, i) => handle.clone().sub(this.first[i])));
+        return this.line.map((today, i) => {
+            const p = moves.getPoint(i / (this.line.length - 1)).add(today);
             return this.surface.closest(p) ?? p;
         });
     }

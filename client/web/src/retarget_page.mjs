@@ -1,7 +1,7 @@
 /* Strands, or a groom, to another head: which one, how, and with what hairline, which is dragged on it. */
 import { call, get } from './api.mjs';
 import { action, by_id, element, notice, say } from './dom.mjs';
-import { HANDLES, HairlineEditor } from './hairline_editor.mjs';
+import { HairlineEditor, POINTS } from './hairline_editor.mjs';
 import { SHAPES } from './hairline_shapes.mjs';
 import { retargetForm } from './retarget_form.mjs';
 import { fetchHead } from './strands.mjs';
@@ -40,7 +40,7 @@ class Target {
     }
 
     async hairline(given, head) {
-        const { json: { front } } = await call('POST', `/v1/heads/${head}/hairline`, { body: { ...given, points: HANDLES } });
+        const { json: { front } } = await call('POST', `/v1/heads/${head}/hairline`, { body: { ...given, points: POINTS } });
         if (head === this.shown) this.#look(this.editor.open(front).expandByScalar(MARGIN_M));
     }
 }
@@ -51,8 +51,9 @@ function hairlinePanel(editor, ask) {
         editor.take(name);
         kind.value = SHAPES[name].kind;
     } }, name));
+    const less = element('button', { type: 'button', onclick: () => editor.lessen(), title: 'Each handle a quarter of the way back, for a line that would fold the scalp' }, 'closer to today’s');
     const words = element('p', { role: 'status', class: 'hint' });
-    const tools = element('div', { hidden: true }, element('div', { class: 'row', role: 'group', 'aria-label': 'Hairlines to start from' }, shapes), element('label', {}, 'and', kind), words,
+    const tools = element('div', { hidden: true }, element('div', { class: 'row', role: 'group', 'aria-label': 'Hairlines to start from' }, shapes), element('div', { class: 'row' }, element('label', {}, 'and', kind), less), words,
         element('p', { class: 'hint' }, 'Drag a handle along the head. Without a mouse, in the picture: [ and ] pick a handle, arrows move it by a millimetre. “As it is” takes all back.'));
     const start = action('Edit the hairline', async () => {
         if (editor.handles.length) editor.close();
@@ -63,6 +64,7 @@ function hairlinePanel(editor, ask) {
         const open = editor.handles.length > 0;
         tools.hidden = !open;
         start.textContent = open ? 'Leave the hairline as it is' : 'Edit the hairline';
+        less.disabled = !editor.moved;
         words.textContent = editor.moved ? 'It goes with the job as it is drawn.' : 'Not moved: the job leaves it as it is carried.';
     };
     editor.addEventListener('change', show);
