@@ -210,7 +210,7 @@ static void write_assignment(struct bundling *b, const uint32_t *guide, uint32_t
 /* --- where they stand ------------------------------------------------------------------------- */
 
 /* Moves a guide so that its root is here, or on the head next to here. */
-static void stand(struct groom_fit *fit, uint32_t guide, const double middle[3], const struct groom_context *context)
+static void stand(struct groom_fit *fit, uint32_t guide, const double middle[3])
 {
     float (*x)[3] = fit->groom->guides + (size_t)guide * fit->m, to[3] = {(float)middle[0], (float)middle[1], (float)middle[2]};
     struct groom_surface_point surface;
@@ -221,10 +221,34 @@ static void stand(struct groom_fit *fit, uint32_t guide, const double middle[3],
         for (uint32_t j = 0; j < fit->m; j++)
             x[j][c] += move;
     }
-    groom_scalp_coordinates(fit->scalp, (const float (*)[3])x, 1, fit->groom->guide_uv + guide, context);
 }
 
-struct middle { double sum[3], n; }; /* of roots */
+struct middle {
+    double sum[3], n;  /* of roots */
+    double nearest;    /* squared distance of `strand` to the guide that stands there */
+    uint32_t strand;
+};
+
+/* Where the file brought the scalp coordinates, no chart tells those of a new place: they are those of the
+ * nearest strand of the guide's own. */
+static void take_coordinates(struct groom_fit *fit, struct middle *middle)
+{
+    struct groom *groom = fit->groom;
+    for (uint32_t i = 0; i < fit->n; i++) {
+        struct middle *of = &middle[groom->operator_guide_of[i]];
+        const float *root = groom->guides[(size_t)groom->operator_guide[groom->operator_guide_of[i]] * fit->m];
+        double square = 0;
+        for (int c = 0; c < 3; c++)
+            square += ((double)fit->roots[i][c] - root[c]) * ((double)fit->roots[i][c] - root[c]);
+        if (square >= of->nearest)
+            continue;
+        of->nearest = square;
+        of->strand = i;
+    }
+    for (uint32_t o = 0; o < groom->n_operator_guides; o++)
+        if (middle[o].n > 0)
+            memcpy(groom->guide_uv[groom->operator_guide[o]], fit->root_uv[middle[o].strand], sizeof *groom->guide_uv);
+}
 
 /* Operator guides to the middles of their strands. middle [n_gop] scratch, zeroed */
 static void centre(struct groom_fit *fit, struct middle *middle, const struct groom_context *context)
@@ -235,12 +259,19 @@ static void centre(struct groom_fit *fit, struct middle *middle, const struct gr
         for (int c = 0; c < 3; c++)
             of->sum[c] += (double)fit->roots[i][c];
         of->n++;
+        of->nearest = INFINITY;
     }
     for (uint32_t o = 0; o < groom->n_operator_guides; o++) {
         const double n = middle[o].n, at[3] = {middle[o].sum[0] / n, middle[o].sum[1] / n, middle[o].sum[2] / n};
-        if (n > 0)
-            stand(fit, groom->operator_guide[o], at, context);
+        uint32_t guide = groom->operator_guide[o];
+        if (!(n > 0))
+            continue;
+        stand(fit, guide, at);
+        if (fit->scalp)
+            groom_scalp_coordinates(fit->scalp, (const float (*)[3])groom->guides + (size_t)guide * fit->m, 1, groom->guide_uv + guide, context);
     }
+    if (!fit->scalp)
+        take_coordinates(fit, middle);
 }
 
 groom_status bundles_centre(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)

@@ -98,15 +98,21 @@ static void is_well_made(const struct groom_fit *fit)
     free(members);
 }
 
-static void fits(const struct groom_strands *strands, const struct groom_mesh *head, double most_unexplained,
-                 const char *what)
+/* most  after `instance_weights`, and after `guides` (0: not looked at) */
+static void fits(const struct groom_strands *strands, const struct groom_mesh *head, double most_weighted,
+                 double most_solved, const char *what)
 {
     struct groom_fit_options options;
     groom_fit_options_init(GROOM_FIT_DRAFT, &options);
     options.vertices = 40;
     struct groom_fit *fit = fitted(strands, head, &options);
     double left = unexplained(fit);
-    ck_assert_msg(left < most_unexplained, "%s: %g of it unexplained", what, left);
+    ck_assert_msg(left < most_weighted, "%s: %g of it unexplained", what, left);
+    if (most_solved > 0) {
+        go_to(fit, FIT_STAGE_guides + 1);
+        left = unexplained(fit);
+        ck_assert_msg(left < most_solved, "%s: %g of it unexplained by solved guides", what, left);
+    }
     go_to(fit, FIT_N_STAGES);
     is_sane(fit);
     is_well_made(fit);
@@ -115,13 +121,17 @@ static void fits(const struct groom_strands *strands, const struct groom_mesh *h
 }
 
 /* The bounds are one and a half times what is measured. Instancing by distance alone leaves 0.02 to
- * 0.08 of these styles and 0.32 of the combover: it blends strands at a parting from both sides. */
+ * 0.08 of these styles and 0.32 of the combover: it blends strands at a parting from both sides.
+ * An operator guide stands in the middle of its bundle, not of its cluster: spiky hair, whose bundles are many and
+ * narrow, is the worse for it before guides are solved (0.0104 where there were 0.0062), and the better after
+ * (0.036 where there were 0.042). */
 START_TEST(every_style_is_fitted)
 {
-    static const double most[GROOM_SAMPLE_STYLE_COUNT] = {
-        [GROOM_SAMPLE_STRAIGHT] = 0.005, [GROOM_SAMPLE_WAVY] = 0.009, [GROOM_SAMPLE_CURLY] = 0.008,
-        [GROOM_SAMPLE_COILY] = 0.016, [GROOM_SAMPLE_SHORT] = 0.013, [GROOM_SAMPLE_SPIKY] = 0.010,
-        [GROOM_SAMPLE_BENT] = 0.010};
+    static const struct { double weighted, solved; } most[GROOM_SAMPLE_STYLE_COUNT] = {
+        [GROOM_SAMPLE_STRAIGHT] = {0.005, 0.0140}, [GROOM_SAMPLE_WAVY] = {0.009, 0.0065},
+        [GROOM_SAMPLE_CURLY] = {0.008, 0.0086},    [GROOM_SAMPLE_COILY] = {0.016, 0.0285},
+        [GROOM_SAMPLE_SHORT] = {0.013, 0.0159},    [GROOM_SAMPLE_SPIKY] = {0.0155, 0.0540},
+        [GROOM_SAMPLE_BENT] = {0.010, 0.0323}};
     struct groom_sample_options options;
     struct groom_sample *sample;
     groom_sample_style style = (groom_sample_style)_i;
@@ -129,8 +139,8 @@ START_TEST(every_style_is_fitted)
     options.n_strands = 2500;
     options.n_vertices = 50;
     ck_ok(groom_sample_create(&options, NULL, &sample, NULL));
-    fits(sample->capture, sample->head, most[style], groom_sample_style_name(style));
-    fits(sample->capture, NULL, 1.5 * most[style], groom_sample_style_name(style));
+    fits(sample->capture, sample->head, most[style].weighted, most[style].solved, groom_sample_style_name(style));
+    fits(sample->capture, NULL, 1.5 * most[style].weighted, 1.5 * most[style].solved, groom_sample_style_name(style));
     groom_sample_destroy(sample);
 }
 END_TEST
@@ -200,7 +210,7 @@ START_TEST(real_captures_are_fitted)
     struct groom_frame frame = frame_of(rows[_i].unit_m, rows[_i].up);
     struct groom_strands *strands = read_strands(path, frame);
     struct groom_mesh *head = rows[_i].head ? read_head(test_shared_data(rows[_i].head), frame) : NULL;
-    fits(strands, head, rows[_i].most, rows[_i].strands);
+    fits(strands, head, rows[_i].most, 0, rows[_i].strands);
     groom_mesh_destroy(head);
     groom_strands_destroy(strands);
 }

@@ -284,7 +284,32 @@ START_TEST(odd_strands_are_survived)
 }
 END_TEST
 
-TEST_SUITE("fit_wild", strands_from_elsewhere_change_nothing_for_the_others, many_that_are_far_are_no_outliers,
+/* No head, and a file that brought scalp coordinates: there is no chart, and each guide has those of a strand. */
+START_TEST(coordinates_of_the_file_serve_where_there_is_no_head)
+{
+    struct groom_sample *sample = sample_of();
+    struct groom_strands *strands = sample->capture;
+    if (!strands->root_uv)
+        ck_assert_ptr_nonnull(strands->root_uv = malloc(N * sizeof *strands->root_uv));
+    for (uint32_t i = 0; i < N; i++)
+        for (int c = 0; c < 2; c++)
+            strands->root_uv[i][c] = 0.5f + 2.0f * strands->points[strands->first[i]][2 * c];
+    struct groom_fit *fit = fitted(strands, NULL);
+    struct groom *groom = groom_of(fit);
+    ck_assert_int_eq(fit->report.scalp, GROOM_SCALP_FILE);
+    for (uint32_t g = 0; g < groom->n_guides; g++) {
+        uint32_t i = 0;
+        while (i < N && memcmp(groom->guide_uv[g], strands->root_uv[i], sizeof *groom->guide_uv) != 0)
+            i++;
+        ck_assert_msg(i < N, "guide %u stands at (%g, %g), where no strand does", g, groom->guide_uv[g][0], groom->guide_uv[g][1]);
+    }
+    groom_destroy(groom);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
+TEST_SUITE("fit_wild", coordinates_of_the_file_serve_where_there_is_no_head, strands_from_elsewhere_change_nothing_for_the_others, many_that_are_far_are_no_outliers,
            a_head_in_another_unit_is_refused, a_head_with_another_axis_up_is_refused, a_head_that_is_elsewhere_is_told,
            few_vertices_become_the_curve_that_they_lie_on,
            crimps_and_strands_of_many_vertices_stay_as_they_are, few_strands_keep_their_places, odd_strands_are_survived)
