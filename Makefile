@@ -103,7 +103,8 @@ $(PARTS_A): $(call objects,$(filter-out $(MAINS),$(DAEMON_SOURCES) $(WORKER_SOUR
 
 # The model for WebAssembly, from the same sources. The same arithmetic in the
 # same order (no contraction): a strand's numbers are the same bits in the page and in the daemon.
-# Documents are taken apart by engine.mjs. Random123 asks for a processor that it knows; any will do.
+# Documents are taken apart by engine.mjs. It is linked without -O: with it clang hands what it has linked to wasm-opt
+# where that is installed, which refuses vectors that it was not told of. Random123 asks for a processor that it knows; any will do.
 ENGINE_SOURCES = $(addprefix lib/base/,diag.c memory.c pool_serial.c random.c status.c) \
                  $(filter-out lib/model/document_%,$(call find_c,lib/model)) lib/strands/strands.c lib/render/light.c \
                  client/web/engine/engine.c
@@ -115,7 +116,7 @@ build/web/obj/%.o: %.c
 	@mkdir -p $(@D)
 	clang $(ENGINE_FLAGS) -MMD -MP -c $< -o $@
 $(ENGINE): $(ENGINE_OBJECTS)
-	clang --target=wasm32-wasi -mexec-model=reactor -O3 -Wl,--gc-sections,--strip-all -o $@ $^ -lm
+	clang --target=wasm32-wasi -mexec-model=reactor -Wl,-O3 -Wl,--gc-sections,--strip-all -o $@ $^ -lm
 
 # The studio: bundled and compressed by esbuild.
 STUDIO         = build/web/studio/.bundled
