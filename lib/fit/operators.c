@@ -44,7 +44,9 @@ enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 #define DAMPING_FLOOR 0.1      /* keeps parameters that nothing speaks for where they are */
 #define LEAST_TURNS 1.0        /* of a curl over a guide: less is a shift that all strands of an operator guide
                                 * share, which shows as patches, most of all in short hair */
-#define CONVERGED 1e-3       /* share of the misfit that a step must gain */
+#define CONVERGED 1e-3       /* share of the misfit that a step must gain, while guides are rough; */
+#define CONVERGED_LAST 1e-5  /* when they are known: valleys are flat, and what stops on their sides remembers its way */
+#define STEPS_AT_HAND 4      /* by the same slopes, near the minimum */
 #define MOST_PARAMETERS (GROOM_FIT_MAX_OPERATORS * GROOM_OPERATOR_MAX_PARAMETERS)
 
 /* --- parameters --------------------------------------------------------------------------- */
@@ -197,27 +199,42 @@ static groom_status search_one(struct matching *matching, struct trial *trial, u
 
 /* --- refinement ---------------------------------------------------------------------------------- */
 
-/* The misfit's slope for each unknown. jacobian [n_unknowns][MOMENTS_COUNT] */
+/* The residual with an unknown moved as far as its range lets it; returns by how much. */
+static groom_status probe(struct matching *matching, struct trial *trial, uint32_t index, double move, double *moved,
+                          double residual[MOMENTS_COUNT], const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct unknown *unknown = &trial->unknowns[index];
+    double x = read_unknown(unknown);
+    float kept = *unknown->value;
+    if (progress_cancelled(context))
+        return groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage operators");
+    write_unknown(unknown, x + move);
+    *moved = read_unknown(unknown) - x;
+    groom_status st = *moved != 0 ? matching_residual(matching, trial->operators, residual, context, diag) : GROOM_OK;
+    *unknown->value = kept;
+    return st;
+}
+
+/* The misfit's slope for each unknown. One side alone leans to where the misfit bends: steps by it end short of the
+ * minimum, where that is depends on the way, and rounding decides. Far from it, one is enough.
+ * jacobian [n_unknowns][MOMENTS_COUNT] */
 static groom_status differentiate(struct matching *matching, struct trial *trial, const double residual[MOMENTS_COUNT],
-                                  double *jacobian, const struct groom_context *context, struct groom_diag *diag)
+                                  int both_sides, double *jacobian, const struct groom_context *context,
+                                  struct groom_diag *diag)
 {
     for (uint32_t k = 0; k < trial->n_unknowns; k++) {
         const struct unknown *unknown = &trial->unknowns[k];
-        double *column = jacobian + (size_t)k * MOMENTS_COUNT, x = read_unknown(unknown), step;
-        double probe = unknown->logarithmic && !unknown->frequency ? PROBE_SIZE : PROBE;
-        float kept = *unknown->value;
-        if (progress_cancelled(context))
-            return groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage operators");
-        write_unknown(unknown, x + probe);
-        if (read_unknown(unknown) <= x) /* at its end: look the other way */
-            write_unknown(unknown, x - probe);
-        step = read_unknown(unknown) - x;
-        groom_status st = matching_residual(matching, trial->operators, column, context, diag);
-        *unknown->value = kept;
+        double *column = jacobian + (size_t)k * MOMENTS_COUNT, below[MOMENTS_COUNT], up, down = 0;
+        double move = unknown->logarithmic && !unknown->frequency ? PROBE_SIZE : PROBE;
+        memcpy(column, residual, sizeof below); /* what there is on a side where its range ends here */
+        memcpy(below, residual, sizeof below);
+        groom_status st = probe(matching, trial, k, move, &up, column, context, diag);
+        if (st == GROOM_OK && (both_sides || !(up > 0)))
+            st = probe(matching, trial, k, -move, &down, below, context, diag);
         if (st != GROOM_OK)
             return st;
         for (int f = 0; f < MOMENTS_COUNT; f++)
-            column[f] = step != 0 ? (column[f] - residual[f]) / step : 0;
+            column[f] = up > down ? (column[f] - below[f]) / (up - down) : 0;
     }
     return GROOM_OK;
 }
@@ -249,47 +266,70 @@ static int solve_step(const double *jacobian, const double residual[MOMENTS_COUN
     return 1;
 }
 
-static void take_step(const struct trial *from, const double step[MOST_PARAMETERS], struct trial *to)
+static void take_step(struct trial *trial, const double start[MOST_PARAMETERS], const double step[MOST_PARAMETERS])
 {
-    for (uint32_t k = 0; k < from->n_unknowns; k++) {
-        double most = from->unknowns[k].logarithmic ? LONGEST_STEP : LONGEST_START;
-        write_unknown(&to->unknowns[k], read_unknown(&from->unknowns[k]) + fmin(fmax(step[k], -most), most));
+    for (uint32_t k = 0; k < trial->n_unknowns; k++) {
+        double most = trial->unknowns[k].logarithmic ? LONGEST_STEP : LONGEST_START;
+        write_unknown(&trial->unknowns[k], start[k] + fmin(fmax(step[k], -most), most));
     }
 }
 
-/* One step of Levenberg and Marquardt: the least damping that gets lower. *ended where none does. */
-static groom_status refine(struct groom_fit *fit, struct matching *matching, double *square, int *ended,
-                           const struct groom_context *context, struct groom_diag *diag)
+/* One step of Levenberg and Marquardt by the slopes at hand: the least damping that gets lower. residual and *square
+ * are those of `here` and move with it; they stay where none does. */
+static groom_status descend(struct matching *matching, struct trial *here, const double *jacobian,
+                            double residual[MOMENTS_COUNT], double *square, const struct groom_context *context,
+                            struct groom_diag *diag)
 {
     static const double dampings[] = {1e-3, 1e-1, 3, 100};
+    double step[MOST_PARAMETERS], start[MOST_PARAMETERS], other[MOMENTS_COUNT];
+    float kept[MOST_PARAMETERS];
+    for (uint32_t k = 0; k < here->n_unknowns; k++) {
+        start[k] = read_unknown(&here->unknowns[k]);
+        kept[k] = *here->unknowns[k].value;
+    }
+    for (int d = 0; d < 4; d++) {
+        if (progress_cancelled(context))
+            return groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage operators");
+        if (!solve_step(jacobian, residual, here->n_unknowns, dampings[d], step))
+            continue;
+        take_step(here, start, step);
+        groom_status st = matching_residual(matching, here->operators, other, context, diag);
+        if (st != GROOM_OK)
+            return st;
+        if (square_of(other) < *square) {
+            *square = square_of(other);
+            memcpy(residual, other, sizeof other);
+            return GROOM_OK;
+        }
+    }
+    for (uint32_t k = 0; k < here->n_unknowns; k++)
+        *here->unknowns[k].value = kept[k];
+    return GROOM_OK;
+}
+
+/* Slopes here, and up to n_steps by them. *ended where they gain less than this share of the misfit. */
+static groom_status refine(struct groom_fit *fit, struct matching *matching, int both_sides, uint32_t n_steps, double least,
+                           double *square, int *ended, const struct groom_context *context, struct groom_diag *diag)
+{
     const struct groom_allocator *allocator = memory_allocator(context);
-    struct trial here, there;
-    double residual[MOMENTS_COUNT], step[MOST_PARAMETERS], before;
+    struct trial here;
+    double residual[MOMENTS_COUNT], before, last;
     double *jacobian = memory_array(allocator, MOST_PARAMETERS, MOMENTS_COUNT * sizeof *jacobian);
     groom_status st = GROOM_OK;
     if (!jacobian)
         return groom_fail(diag, GROOM_ENOMEM, "no memory to refine operators");
     trial_init(fit, &here);
-    trial_init(fit, &there);
-    *ended = 1;
     if ((st = matching_residual(matching, here.operators, residual, context, diag)) != GROOM_OK ||
-        (st = differentiate(matching, &here, residual, jacobian, context, diag)) != GROOM_OK)
+        (st = differentiate(matching, &here, residual, both_sides, jacobian, context, diag)) != GROOM_OK)
         goto out;
-    before = *square = square_of(residual);
-    for (int d = 0; d < 4; d++) {
-        double other;
-        if (!solve_step(jacobian, residual, here.n_unknowns, dampings[d], step))
-            continue;
-        take_step(&here, step, &there);
-        if ((st = misfit(matching, &there, &other, context, diag)) != GROOM_OK)
+    before = last = *square = square_of(residual);
+    for (uint32_t k = 0; k < n_steps; k++, last = *square)
+        if ((st = descend(matching, &here, jacobian, residual, square, context, diag)) != GROOM_OK)
             goto out;
-        if (other < before) {
-            *square = other;
-            *ended = before - other < CONVERGED * before;
-            trial_keep(&there, fit);
+        else if (last - *square < least * last)
             break;
-        }
-    }
+    *ended = before - *square < least * before;
+    trial_keep(&here, fit);
 out:
     memory_release(allocator, jacobian, MOST_PARAMETERS, MOMENTS_COUNT * sizeof *jacobian);
     return st;
@@ -307,7 +347,7 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, const str
     if (st != GROOM_OK)
         return st;
     for (uint32_t k = 0; st == GROOM_OK && !ended && k < n_steps; k++)
-        st = refine(fit, matching, &square, &ended, context, diag);
+        st = refine(fit, matching, 1, STEPS_AT_HAND, CONVERGED_LAST, &square, &ended, context, diag);
     matching_destroy(matching);
     return st;
 }
@@ -454,7 +494,7 @@ static groom_status refine_step(struct groom_fit *fit, struct matching *matching
 {
     double square;
     int converged;
-    groom_status st = refine(fit, matching, &square, &converged, context, diag);
+    groom_status st = refine(fit, matching, floor_of(fit) <= FLOOR_LAST, 1, CONVERGED, &square, &converged, context, diag);
     if (st != GROOM_OK)
         return st;
     report_progress(&fit->report, "operators", "misfit", square, count_unknowns(fit) + fit->iteration, context);

@@ -120,7 +120,7 @@ const struct option_row options_table[] = {
     ROW(randoms, across, OPTION_REAL, 0.1, 0.1, 0.1, 1e-6, 1e6,
         "Pull of each guide towards its neighbours on the scalp where guides are solved again, between rounds, for the numbers found."),
     ROW(randoms, refinements, OPTION_U32, 0, 3, 4, 0, 1000,
-        "Steps of refinement of the operators' parameters, between rounds, for guides solved again."),
+        "Refinements of the operators' parameters at most, between rounds, for guides solved again; it stops where none gets lower."),
     ROW(randoms, iterations, OPTION_U32, 3000, 3000, 3000, 0, 1000000, "Gradient steps of the paper's method."),
     ROW(randoms, learning_rate, OPTION_REAL, 0.1, 0.1, 0.1, 0, 1e3, "Learning rate of the paper's method."),
     ROW(randoms, noise_first, OPTION_REAL, 1.5, 1.5, 1.5, 0, 1e3,

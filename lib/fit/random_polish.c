@@ -12,11 +12,13 @@
 #define SCALE_STEP 0.02f   /* in random numbers */
 #define BEND_STEP 0.01f
 #define FRIZZ_STEP 0.004f
+#define FLAT 1e-4          /* of an error that differs by no more over a step nothing is known: numbers stay where they are */
 
 struct polish_job {
     struct random_search *search;
     uint32_t first, count, n_steps;
     float hold;
+    int weights;
 };
 
 /* Coordinate i of a block: a random number of an active operator, or the weight that guide `weight` takes
@@ -52,7 +54,8 @@ static void list_coordinates(struct polish *polish)
         if (shows(op))
             polish->at[polish->n++] = (struct coordinate){0, a, 0, step_of(op->type), random[0].minimum, random[0].maximum};
     }
-    for (uint32_t w = 0; w + 1 < plan->groom->n_instancing && w < RANDOM_BLOCK_WEIGHTS && polish->n < MOST; w++, polish->n_weights++)
+    uint32_t most = polish->job->weights ? RANDOM_BLOCK_WEIGHTS : 0;
+    for (uint32_t w = 0; w + 1 < plan->groom->n_instancing && w < most && polish->n < MOST; w++, polish->n_weights++)
         polish->at[polish->n++] = (struct coordinate){1, 0, w, WEIGHT_STEP, -1, 1};
 }
 
@@ -118,7 +121,7 @@ static void solve_lane(const struct polish *polish, lanes gradient[MOST], lanes 
             double h = polish->at[i].step;
             for (uint32_t j = 0; j <= i; j++)
                 a[i * n + j] = (double)hessian[i][j][l];
-            a[i * n + i] += damping * fabs(a[i * n + i]) + 1e-6 / (h * h);
+            a[i * n + i] += damping * fabs(a[i * n + i]) + FLAT / (h * h);
             step[i] = -(double)gradient[i][l];
         }
         if (dense_cholesky(a, n)) {
@@ -206,8 +209,8 @@ static void polish_piece(void *user, uint32_t piece, uint32_t thread)
 }
 
 void random_search_polish(struct random_search *search, uint32_t first, uint32_t count, uint32_t n_steps, float hold,
-                          const struct groom_context *context)
+                          int weights, const struct groom_context *context)
 {
-    struct polish_job job = {search, first, count, n_steps, hold};
+    struct polish_job job = {search, first, count, n_steps, hold, weights};
     parallel_for(context, (count + RANDOM_BLOCK_PIECE - 1) / RANDOM_BLOCK_PIECE, polish_piece, &job);
 }

@@ -61,11 +61,12 @@ void random_search_curls(struct random_search *search, uint32_t active, uint32_t
 void random_search_guides(struct random_search *search, uint32_t first, uint32_t count, const uint32_t *candidate,
                           uint32_t n_candidates, float gain, const struct groom_context *context);
 
-/* All numbers of strands first .. first + count - 1 at once, and their instancing weights: Newton's steps on
- * their errors, from where they are. Weights stay at least 0 and sum to 1.
+/* All numbers of strands first .. first + count - 1 at once, and, where it is wanted, their instancing weights:
+ * Newton's steps on their errors, from where they are. Weights stay at least 0 and sum to 1.
  * n_steps  at most
- * hold     what moving a weight by 1 costs, squared */
+ * hold     what moving a weight by 1 costs, squared
+ * weights  whether they are moved */
 void random_search_polish(struct random_search *search, uint32_t first, uint32_t count, uint32_t n_steps, float hold,
-                          const struct groom_context *context);
+                          int weights, const struct groom_context *context);
 
 #endif

@@ -269,8 +269,9 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
         return GROOM_OK;
     case CURLS: return search_curls(fit, search, pass, count, context, diag);
     case POLISH:
+        /* weights only where no guides and parameters come after: these would follow where strands have slipped to */
         random_search_polish(search, fit->iteration, count, is_last(fit, pass) ? POLISH_STEPS : 1,
-                             (float)fit->options.stages.randoms.hold, context);
+                             (float)fit->options.stages.randoms.hold, is_last(fit, pass), context);
         return GROOM_OK;
     case CENTRE:
     case RESHAPE: break;
