@@ -91,8 +91,14 @@ static int is_absent(const struct groom_operator *op)
     return (op->type == GROOM_OPERATOR_CURL || op->type == GROOM_OPERATOR_CLUMP) && op->parameter[0] == 0;
 }
 
-static uint32_t list_unknowns(struct groom_operator *operators, uint32_t n_operators, double ordinary,
-                              double guide_length, struct unknown *unknowns)
+static int is_known(const struct groom_operator *op, const char *name, int frequencies_known)
+{
+    return frequencies_known && op->type == GROOM_OPERATOR_CURL &&
+           (strcmp(name, "frequency") == 0 || strcmp(name, "random_frequency") == 0);
+}
+
+static uint32_t list_unknowns(struct groom_operator *operators, uint32_t n_operators, int frequencies_known,
+                              double ordinary, double guide_length, struct unknown *unknowns)
 {
     uint32_t n = 0, n_parameters;
     for (uint32_t o = 0; o < n_operators; o++) {
@@ -100,6 +106,8 @@ static uint32_t list_unknowns(struct groom_operator *operators, uint32_t n_opera
         for (uint32_t k = 0; operators[o].enabled && !is_absent(&operators[o]) && k < n_parameters; k++) {
             int place = p[k].slider_maximum <= 1 && strcmp(p[k].name, "start") == 0;
             double initial = initial_of(&p[k], ordinary);
+            if (is_known(&operators[o], p[k].name, frequencies_known))
+                continue;
             unknowns[n++] = (struct unknown){&operators[o].parameter[k],
                                              place ? p[k].minimum
                                                    : minimum_of(&p[k], initial, operators[o].type, guide_length),
@@ -129,14 +137,16 @@ struct trial {
     uint32_t n_operators, n_unknowns;
 };
 
-static void trial_init(const struct groom_fit *fit, struct trial *trial)
+static void trial_init_for(const struct groom_fit *fit, int frequencies_known, struct trial *trial)
 {
     trial->n_operators = fit->groom->n_operators;
     if (trial->n_operators) /* of none there is no array to copy */
         memcpy(trial->operators, fit->groom->operators, trial->n_operators * sizeof *trial->operators);
-    trial->n_unknowns = list_unknowns(trial->operators, trial->n_operators, fit->ordinary,
+    trial->n_unknowns = list_unknowns(trial->operators, trial->n_operators, frequencies_known, fit->ordinary,
                                       mean_guide_length(fit->groom), trial->unknowns);
 }
+
+static void trial_init(const struct groom_fit *fit, struct trial *trial) { trial_init_for(fit, 0, trial); }
 
 static void trial_keep(const struct trial *trial, struct groom_fit *fit)
 {
@@ -307,47 +317,47 @@ static groom_status descend(struct matching *matching, struct trial *here, const
     return GROOM_OK;
 }
 
-/* Slopes here, and up to n_steps by them. *ended where they gain less than this share of the misfit. */
-static groom_status refine(struct groom_fit *fit, struct matching *matching, int both_sides, uint32_t n_steps, double least,
+/* Slopes at `here`, and up to n_steps by them, which move it. *ended where they gain less than this share of the misfit. */
+static groom_status refine(struct matching *matching, struct trial *here, int both_sides, uint32_t n_steps, double least,
                            double *square, int *ended, const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
-    struct trial here;
     double residual[MOMENTS_COUNT], before, last;
     double *jacobian = memory_array(allocator, MOST_PARAMETERS, MOMENTS_COUNT * sizeof *jacobian);
     groom_status st = GROOM_OK;
     if (!jacobian)
         return groom_fail(diag, GROOM_ENOMEM, "no memory to refine operators");
-    trial_init(fit, &here);
-    if ((st = matching_residual(matching, here.operators, residual, context, diag)) != GROOM_OK ||
-        (st = differentiate(matching, &here, residual, both_sides, jacobian, context, diag)) != GROOM_OK)
+    if ((st = matching_residual(matching, here->operators, residual, context, diag)) != GROOM_OK ||
+        (st = differentiate(matching, here, residual, both_sides, jacobian, context, diag)) != GROOM_OK)
         goto out;
     before = last = *square = square_of(residual);
     for (uint32_t k = 0; k < n_steps; k++, last = *square)
-        if ((st = descend(matching, &here, jacobian, residual, square, context, diag)) != GROOM_OK)
+        if ((st = descend(matching, here, jacobian, residual, square, context, diag)) != GROOM_OK)
             goto out;
         else if (last - *square < least * last)
             break;
     *ended = before - *square < least * before;
-    trial_keep(&here, fit);
 out:
     memory_release(allocator, jacobian, MOST_PARAMETERS, MOMENTS_COUNT * sizeof *jacobian);
     return st;
 }
 
-groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, const struct groom_context *context,
-                              struct groom_diag *diag)
+groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequencies_known,
+                              const struct groom_context *context, struct groom_diag *diag)
 {
     struct matching *matching;
+    struct trial here;
     double square;
     int ended = 0;
-    if (count_unknowns(fit) == 0)
+    trial_init_for(fit, frequencies_known, &here);
+    if (here.n_unknowns == 0)
         return GROOM_OK;
     groom_status st = matching_create(fit, fit->options.stages.operators.pairs, FLOOR_LAST, context, &matching, diag);
     if (st != GROOM_OK)
         return st;
     for (uint32_t k = 0; st == GROOM_OK && !ended && k < n_steps; k++)
-        st = refine(fit, matching, 1, STEPS_AT_HAND, CONVERGED_LAST, &square, &ended, context, diag);
+        if ((st = refine(matching, &here, 1, STEPS_AT_HAND, CONVERGED_LAST, &square, &ended, context, diag)) == GROOM_OK)
+            trial_keep(&here, fit);
     matching_destroy(matching);
     return st;
 }
@@ -492,11 +502,14 @@ static groom_status search_step(struct groom_fit *fit, struct matching *matching
 static groom_status refine_step(struct groom_fit *fit, struct matching *matching, const struct groom_context *context,
                                 struct groom_diag *diag)
 {
-    double square;
-    int converged;
-    groom_status st = refine(fit, matching, floor_of(fit) <= FLOOR_LAST, 1, CONVERGED, &square, &converged, context, diag);
+    struct trial here;
+    double square = 0;
+    int converged = 0;
+    trial_init(fit, &here);
+    groom_status st = refine(matching, &here, floor_of(fit) <= FLOOR_LAST, 1, CONVERGED, &square, &converged, context, diag);
     if (st != GROOM_OK)
         return st;
+    trial_keep(&here, fit);
     report_progress(&fit->report, "operators", "misfit", square, count_unknowns(fit) + fit->iteration, context);
     if (++fit->iteration >= fit->options.stages.operators.refinements || (converged && floor_of(fit) <= FLOOR_LAST)) {
         fit->phase = AFTER;

@@ -123,6 +123,8 @@ struct curls_job {
     struct random_search *search;
     const struct random_search_groups *groups;
     uint32_t active, first;
+    uint32_t part, n_parts; /* of a guide's strands, every n_parts-th is asked; all: 0 of 1 */
+    float (*half)[2];
 };
 
 /* Values of (u1, u2) that are tried: u1 = rate_first + i rate_step, u2 = phase_first + k phase_step. */
@@ -186,16 +188,18 @@ static void add_costs(const struct curls_job *job, struct random_search_memory *
 static uint32_t asked(const struct curls_job *job, uint32_t guide)
 {
     uint32_t all = job->groups->begin[guide + 1] - job->groups->begin[guide];
-    return all < job->groups->n_strands ? all : job->groups->n_strands;
+    uint32_t most = all < job->groups->n_strands ? all : job->groups->n_strands;
+    return most > job->part ? (most - job->part - 1) / job->n_parts + 1 : 0;
 }
 
 /* and which, from the i-th on. */
 static struct block asked_block(const struct curls_job *job, uint32_t guide, uint32_t i)
 {
     uint32_t begin = job->groups->begin[guide], all = job->groups->begin[guide + 1] - begin, n = asked(job, guide);
+    uint32_t most = all < job->groups->n_strands ? all : job->groups->n_strands;
     uint32_t strand[LANES], n_here = n - i < LANES ? n - i : LANES;
     for (uint32_t l = 0; l < n_here; l++)
-        strand[l] = job->groups->member[begin + (uint32_t)((uint64_t)(i + l) * all / n)];
+        strand[l] = job->groups->member[begin + (uint32_t)((uint64_t)((i + l) * job->n_parts + job->part) * all / most)];
     return block_of(strand, n_here);
 }
 
@@ -327,8 +331,35 @@ static void curl_piece(void *user, uint32_t piece, uint32_t thread)
 void random_search_curls(struct random_search *search, uint32_t active, uint32_t first, uint32_t count,
                          const struct random_search_groups *groups, const struct groom_context *context)
 {
-    struct curls_job job = {search, groups, active, first};
+    struct curls_job job = {search, groups, active, first, 0, 1, NULL};
     parallel_for(context, count, curl_piece, &job);
+}
+
+static void halves_piece(void *user, uint32_t guide, uint32_t thread)
+{
+    const struct curls_job *job = user;
+    const struct groom_operator *op = operator_of(job->search, job->active);
+    uint32_t n_rates = rates_of(job, guide);
+    for (uint32_t h = 0; h < 2; h++) {
+        struct curls_job half = *job;
+        float u[2] = {op->random[0][guide], op->random[1][guide]};
+        float rate_step = n_rates > 1 ? 2.0f / (float)(n_rates - 1) : 2.0f, phase_step = PERIOD / PHASES;
+        half.part = h;
+        half.n_parts = 2;
+        for (int pass = 0; pass < LOCAL_PASSES; pass++) {
+            rate_step *= 0.35f, phase_step *= 0.35f;
+            struct curl_grid grid = grid_around(u, rate_step, phase_step);
+            search_grid(&half, &job->search->memory[thread], guide, &grid, u);
+        }
+        job->half[guide][h] = asked(&half, guide) > 0 ? u[0] : NAN;
+    }
+}
+
+void random_search_halves(struct random_search *search, uint32_t active, const struct random_search_groups *groups,
+                          float (*half)[2], const struct groom_context *context)
+{
+    struct curls_job job = {search, groups, active, 0, 0, 1, half};
+    parallel_for(context, search->plan.groom->n_operator_guides, halves_piece, &job);
 }
 
 /* --- the operator guide of a strand ----------------------------------------------------------------- */

@@ -54,6 +54,12 @@ struct random_search_groups {
 void random_search_curls(struct random_search *search, uint32_t active, uint32_t first, uint32_t count,
                          const struct random_search_groups *groups, const struct groom_context *context);
 
+/* The first number of each operator guide, looked for around what it has by one half of the strands that are asked
+ * alone, and by the other; NAN where a half has none.
+ * half  [n_gop][2] out */
+void random_search_halves(struct random_search *search, uint32_t active, const struct random_search_groups *groups,
+                          float (*half)[2], const struct groom_context *context);
+
 /* Which operator guide strands first .. first + count - 1 follow: of those near them, the one with which
  * they come nearest to their targets.
  * candidate  [count][n_candidates] operator guides that some strand follows, UINT32_MAX: none

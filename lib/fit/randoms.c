@@ -18,6 +18,7 @@
 #include "base/memory.h"
 #include "base/progress.h"
 #include "fit/bundles.h"
+#include "fit/frequencies.h"
 #include "fit/gather.h"
 #include "fit/guides.h"
 #include "fit/loss_strands.h"
@@ -40,12 +41,13 @@
 /* --- the row of passes ------------------------------------------------------------------------- */
 
 /* What is looked for: which operator guide each strand follows, the numbers of strands in one operator,
- * those of operator guides, the last digits of all that a strand has, what these tell of where operator guides stand
+ * those of operator guides, the law that these follow, the last digits of all that a strand has, what these tell of where operator guides stand
  * and how long guides are, or the guides that go with them and the operators' parameters for these guides. */
 struct pass {
-    enum { FOLLOW, STRANDS, CURLS, POLISH, CENTRE, RESHAPE } kind;
+    enum { FOLLOW, STRANDS, CURLS, LAW, POLISH, CENTRE, RESHAPE } kind;
     uint32_t round;
-    uint32_t op, active; /* of STRANDS and CURLS: its index in the chain, and among those that are enabled */
+    uint32_t op, active; /* of STRANDS, CURLS and LAW: its index in the chain, and among those that are enabled */
+    int wide;            /* of CURLS and LAW: a look at more frequencies than there may be, for the law to begin with */
 };
 
 static int has_effect(const struct groom_operator *op)
@@ -67,8 +69,15 @@ static uint32_t list_numbers(const struct groom *groom, uint32_t round, int per_
     for (uint32_t o = 0; o < groom->n_operators; o++) {
         const struct groom_operator *op = &groom->operators[o];
         if (has_effect(op) && groom_operator_random_arrays(op->type) > 0 &&
-            groom_operator_random_per_guide(op->type) == per_guide)
-            passes[n++] = (struct pass){per_guide ? CURLS : STRANDS, round, o, active};
+            groom_operator_random_per_guide(op->type) == per_guide) {
+            if (per_guide && round == 0 && frequencies_tell(groom)) {
+                passes[n++] = (struct pass){CURLS, round, o, active, 1};
+                passes[n++] = (struct pass){LAW, round, o, active, 1};
+            }
+            passes[n++] = (struct pass){per_guide ? CURLS : STRANDS, round, o, active, 0};
+            if (per_guide && frequencies_tell(groom))
+                passes[n++] = (struct pass){LAW, round, o, active, 0};
+        }
         active += op->enabled != 0;
     }
     return n;
@@ -79,7 +88,7 @@ static uint32_t list_numbers(const struct groom *groom, uint32_t round, int per_
 static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST_PASSES])
 {
     uint32_t n = 0, n_rounds = fit->options.stages.randoms.rounds;
-    for (uint32_t round = 0; round < n_rounds && n + GROOM_FIT_MAX_OPERATORS + 4 <= MOST_PASSES; round++) {
+    for (uint32_t round = 0; round < n_rounds && n + 4 * GROOM_FIT_MAX_OPERATORS + 4 <= MOST_PASSES; round++) {
         uint32_t n_curls = list_numbers(fit->groom, round, 1, passes + n), begin = n;
         n += n_curls;
         if (n_curls > 0 || clumps(fit->groom))
@@ -98,7 +107,7 @@ static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST
 
 static uint32_t size_of(const struct groom_fit *fit, const struct pass *pass)
 {
-    if (pass->kind == CENTRE || pass->kind == RESHAPE)
+    if (pass->kind == LAW || pass->kind == CENTRE || pass->kind == RESHAPE)
         return 1;
     return pass->kind == CURLS ? fit->groom->n_operator_guides : fit->n;
 }
@@ -177,8 +186,10 @@ static uint32_t scale_before(const struct groom *groom, uint32_t op)
     return found;
 }
 
+/* Curls first .. first + count - 1; half: NULL, or by halves of all curls' strands. */
 static groom_status search_curls(struct groom_fit *fit, struct random_search *search, const struct pass *pass,
-                                 uint32_t count, const struct groom_context *context, struct groom_diag *diag)
+                                 uint32_t count, float (*half)[2], const struct groom_context *context,
+                                 struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     size_t n_begin = (size_t)fit->groom->n_operator_guides + 1;
@@ -189,10 +200,30 @@ static groom_status search_curls(struct groom_fit *fit, struct random_search *se
         struct random_search_groups groups = {member, begin, fit->options.stages.randoms.strands, pass->round == 0,
                                               scale_before(fit->groom, pass->op)};
         sort_by_guide(fit->groom, begin, member);
-        random_search_curls(search, pass->active, fit->iteration, count, &groups, context);
+        if (!half && pass->wide && fit->iteration == 0)
+            frequencies_widen(fit->groom, &fit->groom->operators[pass->op]);
+        if (half)
+            random_search_halves(search, pass->active, &groups, half, context);
+        else
+            random_search_curls(search, pass->active, fit->iteration, count, &groups, context);
     }
     memory_release(allocator, begin, n_begin, sizeof *begin);
     memory_release(allocator, member, fit->n, sizeof *member);
+    return st;
+}
+
+static groom_status restate_frequencies(struct groom_fit *fit, struct random_search *search, const struct pass *pass,
+                                        const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    uint32_t n = fit->groom->n_operator_guides;
+    float (*half)[2] = memory_array(allocator, n, sizeof *half);
+    if (!half)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for the frequencies of %u curls", n);
+    groom_status st = search_curls(fit, search, pass, n, half, context, diag);
+    if (st == GROOM_OK)
+        st = frequencies_restate(fit->groom, &fit->groom->operators[pass->op], (const float (*)[2])half, pass->wide, allocator, diag);
+    memory_release(allocator, half, n, sizeof *half);
     return st;
 }
 
@@ -247,6 +278,7 @@ static uint32_t step_size(const struct groom_fit *fit, const struct pass *pass)
     case STRANDS: values = grid_of(fit, pass); break;
     case CURLS: values = CURL_VALUES * fit->options.stages.randoms.strands; break;
     case POLISH: values = POLISH_VALUES; break;
+    case LAW:
     case CENTRE:
     case RESHAPE: return left;
     }
@@ -267,7 +299,8 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
     case STRANDS:
         random_search_strands(search, pass->active, fit->iteration, count, grid_of(fit, pass), HALVINGS, context);
         return GROOM_OK;
-    case CURLS: return search_curls(fit, search, pass, count, context, diag);
+    case CURLS: return search_curls(fit, search, pass, count, NULL, context, diag);
+    case LAW: return restate_frequencies(fit, search, pass, context, diag);
     case POLISH:
         /* weights only where no guides and parameters come after: these would follow where strands have slipped to */
         random_search_polish(search, fit->iteration, count, is_last(fit, pass) ? POLISH_STEPS : 1,
@@ -314,7 +347,7 @@ static groom_status reshape_step(struct groom_fit *fit, const struct groom_conte
 {
     groom_status st = guides_refine(fit, context, diag);
     if (st == GROOM_OK)
-        st = operators_refine(fit, fit->options.stages.randoms.refinements, context, diag);
+        st = operators_refine(fit, fit->options.stages.randoms.refinements, frequencies_tell(fit->groom), context, diag);
     return st;
 }
 

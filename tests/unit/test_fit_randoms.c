@@ -4,6 +4,8 @@
 #include <string.h>
 
 #include "fit/gradient_strands.h"
+#include "base/memory.h"
+#include "fit/frequencies.h"
 #include "fit/guides.h"
 #include "fit/loss_strands.h"
 #include "fit/state.h"
@@ -223,6 +225,66 @@ START_TEST(what_scales_have_in_common_goes_to_the_guides)
 }
 END_TEST
 
+/* --- the law of curls' frequencies ------------------------------------------------------- */
+
+/* The curl of a truth, told by a law that is too wide and too fast. Returns the frequencies that it has. */
+static struct groom_operator *told_wrongly(struct groom *groom, double *frequency)
+{
+    struct groom_operator *curl = &groom->operators[1];
+    ck_assert_int_eq(curl->type, GROOM_OPERATOR_CURL);
+    for (uint32_t o = 0; o < groom->n_operator_guides; o++) {
+        frequency[o] = (double)curl->parameter[1] + (double)curl->parameter[2] * (double)curl->random[0][o];
+        curl->random[0][o] = (float)((frequency[o] - (double)curl->parameter[1] - 2) / (3 * (double)curl->parameter[2]));
+    }
+    curl->parameter[1] += 2;
+    curl->parameter[2] *= 3;
+    return curl;
+}
+
+static void restate(struct groom *groom, struct groom_operator *curl, double apart)
+{
+    struct groom_diag diag = {0};
+    uint32_t n = groom->n_operator_guides;
+    float (*half)[2] = malloc(n * sizeof *half);
+    for (uint32_t o = 0; o < n; o++)
+        for (int h = 0; h < 2; h++)
+            half[o][h] = curl->random[0][o] + (float)(h ? apart : -apart);
+    ck_assert_int_eq(frequencies_restate(groom, curl, (const float (*)[2])half, 0, memory_allocator(NULL), &diag), GROOM_OK);
+    free(half);
+}
+
+START_TEST(frequencies_that_are_found_tell_their_law)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_COILY, 2000, M, 3, NULL);
+    struct groom *groom = sample->truth;
+    double *frequency = malloc(groom->n_operator_guides * sizeof *frequency);
+    double right = (double)groom->operators[1].parameter[1], random = (double)groom->operators[1].parameter[2];
+    struct groom_operator *curl = told_wrongly(groom, frequency);
+    ck_assert_int_eq(frequencies_tell(groom), 1);
+    restate(groom, curl, 0);
+    ck_assert_double_eq_tol((double)curl->parameter[1], right, 0.02 * right);
+    ck_assert_double_eq_tol((double)curl->parameter[2], random, 0.1 * random);
+    for (uint32_t o = 0; o < groom->n_operator_guides; o++) /* but for those at the law's ends */
+        ck_assert_double_eq_tol((double)curl->parameter[1] + (double)curl->parameter[2] * (double)curl->random[0][o], frequency[o], 0.15 * random);
+    free(frequency);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
+START_TEST(what_halves_of_the_strands_do_not_agree_on_is_no_difference_of_curls)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_COILY, 2000, M, 3, NULL);
+    double *frequency = malloc(sample->truth->n_operator_guides * sizeof *frequency);
+    double random = (double)sample->truth->operators[1].parameter[2];
+    struct groom_operator *curl = told_wrongly(sample->truth, frequency);
+    restate(sample->truth, curl, 0.1);
+    ck_assert_double_lt((double)curl->parameter[2], 0.9 * random);
+    ck_assert_double_gt((double)curl->parameter[2], 0.4 * random);
+    free(frequency);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
 START_TEST(the_stage_has_the_same_bits_for_any_threads)
 {
     struct groom_sample *sample = guides_sample(GROOM_SAMPLE_WAVY, 220, M, 3, NULL);
@@ -382,7 +444,8 @@ TEST_SUITE("fit_randoms", the_error_is_none_on_the_same_curve_however_its_vertic
            the_error_has_the_same_bits_in_all_variants, the_losses_are_those_of_their_equation,
            numbers_of_bent_hair_are_found, numbers_of_spiky_hair_are_found, numbers_of_curls_are_found,
            guides_of_straight_hair_follow_known_numbers, guides_of_wavy_hair_follow_known_numbers,
-           what_scales_have_in_common_goes_to_the_guides, the_stage_has_the_same_bits_for_any_threads, the_stage_can_be_interrupted_anywhere,
+           what_scales_have_in_common_goes_to_the_guides, frequencies_that_are_found_tell_their_law,
+           what_halves_of_the_strands_do_not_agree_on_is_no_difference_of_curls, the_stage_has_the_same_bits_for_any_threads, the_stage_can_be_interrupted_anywhere,
            a_step_without_memory_changes_nothing, no_rounds_leave_the_numbers_as_they_were_drawn,
            the_papers_gradient_is_that_of_its_loss, the_papers_steps_go_down,
            the_papers_steps_can_be_interrupted_and_know_no_threads, the_papers_steps_without_memory_change_nothing)
