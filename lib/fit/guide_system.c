@@ -8,6 +8,8 @@
 #include "base/progress.h"
 
 #define BAND 3
+#define LEAST_PIVOT 1e-12
+#define ACROSS 4 /* of a matrix entry; before it data: own shapes, own and clumped, clumped and own, clumped */
 
 static const double difference[BAND + 1] = {-1, 3, -3, 1}; /* third: zero on what turns at one rate */
 
@@ -23,8 +25,9 @@ static int add_data_row(struct sparse *matrix, const struct mean_strands *mean, 
             if (!entry)
                 return 0;
             entry[0] += (double)own->shape * all[p].shape;
-            entry[1] += (double)own->shape * all[p].clumped + (double)own->clumped * all[p].shape;
-            entry[2] += (double)own->clumped * all[p].clumped;
+            entry[1] += (double)own->shape * all[p].clumped;
+            entry[2] += (double)own->clumped * all[p].shape;
+            entry[3] += (double)own->clumped * all[p].clumped;
         }
     }
     return 1;
@@ -43,7 +46,7 @@ static int add_across_row(struct sparse *matrix, const struct sparse *l, uint32_
             double *entry = sparse_entry(matrix, g, l->column[b]);
             if (!entry)
                 return 0;
-            entry[3] += weight * here * l->value[b][0];
+            entry[ACROSS] += weight * here * l->value[b][0];
         }
     }
     return 1;
@@ -77,12 +80,13 @@ groom_status guide_system_init(struct guide_system *system, const struct mean_st
     system->hold = memory_array_zero(allocator, size, sizeof *system->hold);
     system->pull = memory_array(allocator, size, sizeof *system->pull);
     system->band = memory_array(allocator, size - mean->n_guides, sizeof *system->band);
+    system->arrow = memory_array(allocator, size, sizeof *system->arrow);
     system->r = memory_array(allocator, size, sizeof *system->r);
     system->z = memory_array(allocator, size, sizeof *system->z);
     system->p = memory_array(allocator, size, sizeof *system->p);
     system->q = memory_array(allocator, size, sizeof *system->q);
     system->partial = memory_array(allocator, mean->n_guides, sizeof *system->partial);
-    if (!fine || !system->power || !system->hold || !system->pull || !system->band || !system->r || !system->z ||
+    if (!fine || !system->power || !system->hold || !system->pull || !system->band || !system->arrow || !system->r || !system->z ||
         !system->p || !system->q || !system->partial || !fill_matrix(system, mean, laplacian, across))
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the equations of %u guides", mean->n_guides);
     for (uint32_t j = 0; j < mean->m; j++) {
@@ -104,6 +108,7 @@ void guide_system_finish(struct guide_system *system)
     memory_release(allocator, system->hold, size, sizeof *system->hold);
     memory_release(allocator, system->pull, size, sizeof *system->pull);
     memory_release(allocator, system->band, size - system->n_guides, sizeof *system->band);
+    memory_release(allocator, system->arrow, size, sizeof *system->arrow);
     memory_release(allocator, system->r, size, sizeof *system->r);
     memory_release(allocator, system->z, size, sizeof *system->z);
     memory_release(allocator, system->p, size, sizeof *system->p);
@@ -119,23 +124,61 @@ struct product {
     double (*out)[3];
 };
 
+/* What shape at vertex j weighs with shape at vertex j; ... */
 static double weight_at(const struct guide_system *system, const double value[SPARSE_WIDTH], uint32_t j)
 {
     const double *power = system->power[j];
-    return power[0] * value[0] + power[1] * value[1] + power[2] * value[2] + value[3];
+    return power[0] * value[0] + power[1] * (value[1] + value[2]) + power[2] * value[3] + value[ACROSS];
 }
 
-/* Third differences and their transpose. */
+/* ... the root of the other with this one's shape; ... */
+static double others_root(const struct guide_system *system, const double value[SPARSE_WIDTH], uint32_t j)
+{
+    return system->power[j][1] * value[1] + system->power[j][2] * value[3];
+}
+
+/* ... and this one's root with the other's shape. */
+static double own_root(const struct guide_system *system, const double value[SPARSE_WIDTH], uint32_t j)
+{
+    return system->power[j][1] * value[2] + system->power[j][2] * value[3];
+}
+
+static double root_with_root(const struct guide_system *system, const double value[SPARSE_WIDTH])
+{
+    double sum = 0;
+    for (uint32_t j = 1; j < system->m; j++)
+        sum += system->power[j][2] * value[3];
+    return sum;
+}
+
+/* Third differences of the shape, which begins at 0, and their transpose. */
 static void add_along(const struct guide_system *system, const double (*restrict s)[3], double (*restrict out)[3])
 {
     for (uint32_t j = 0; j + BAND < system->m; j++)
         for (int c = 0; c < 3; c++) {
+            uint32_t begin = j == 0;
             double sum = 0;
-            for (int d = 0; d <= BAND; d++)
+            for (uint32_t d = begin; d <= BAND; d++)
                 sum += difference[d] * s[j + d][c];
-            for (int d = 0; d <= BAND; d++)
+            for (uint32_t d = begin; d <= BAND; d++)
                 out[j + d][c] += system->along * difference[d] * sum;
         }
+}
+
+/* out += what the moves of roots, rows 0, do to it and are done by it. */
+static void add_roots(const struct guide_system *system, const double value[SPARSE_WIDTH], const double (*restrict s)[3],
+                      double (*restrict out)[3])
+{
+    double both = root_with_root(system, value);
+    for (int c = 0; c < 3; c++)
+        out[0][c] += both * s[0][c];
+    for (uint32_t j = 1; j < system->m; j++) {
+        double here = own_root(system, value, j), there = others_root(system, value, j);
+        for (int c = 0; c < 3; c++) {
+            out[0][c] += here * s[j][c];
+            out[j][c] += there * s[0][c];
+        }
+    }
 }
 
 static void apply_row(void *user, uint32_t g, uint32_t thread)
@@ -150,15 +193,16 @@ static void apply_row(void *user, uint32_t g, uint32_t thread)
         for (int c = 0; c < 3; c++)
             out[j][c] = system->hold[(size_t)g * m + j] * own[j][c];
     for (uint32_t at = system->matrix.first[g]; at < system->matrix.first[g + 1]; at++) {
-        const double (*restrict s)[3] = job->shape + (size_t)system->matrix.column[at] * m;
+        const double (*restrict s)[3] = job->shape + (size_t)system->matrix.column[at] * m, *value = system->matrix.value[at];
         for (uint32_t j = 1; j < m; j++) {
-            double weight = weight_at(system, system->matrix.value[at], j);
+            double weight = weight_at(system, value, j);
             for (int c = 0; c < 3; c++)
                 out[j][c] += weight * s[j][c];
         }
+        if (value[2] != 0 || value[3] != 0 || value[1] != 0)
+            add_roots(system, value, s, out);
     }
     add_along(system, own, out);
-    memset(out[0], 0, sizeof out[0]); /* the root does not move */
 }
 
 void guide_system_apply(struct guide_system *system, const double (*shape)[3], double (*out)[3],
@@ -170,14 +214,19 @@ void guide_system_apply(struct guide_system *system, const double (*shape)[3], d
 
 /* --- preconditioner --------------------------------------------------------------------- */
 
-/* A guide's own block: row j - 1 is vertex j, entry BAND - d couples it with vertex j - d. */
+static const double *own_entry(const struct guide_system *system, uint32_t g)
+{
+    uint32_t at = system->matrix.first[g];
+    while (system->matrix.column[at] != g)
+        at++;
+    return system->matrix.value[at];
+}
+
+/* A guide's own block, but for its root: row j - 1 is vertex j, entry BAND - d couples it with vertex j - d. */
 static void fill_block(const struct guide_system *system, uint32_t g, double (*band)[BAND + 1])
 {
     uint32_t m = system->m;
-    const double *own = NULL;
-    for (uint32_t at = system->matrix.first[g]; at < system->matrix.first[g + 1]; at++)
-        if (system->matrix.column[at] == g)
-            own = system->matrix.value[at];
+    const double *own = own_entry(system, g);
     memset(band, 0, (m - 1) * sizeof *band);
     for (uint32_t j = 1; j < m; j++)
         band[j - 1][BAND] = weight_at(system, own, j) + system->hold[(size_t)g * m + j];
@@ -202,10 +251,42 @@ static void factor(double (*band)[BAND + 1], uint32_t n)
             for (uint32_t k = row < BAND ? 0 : row - BAND; k < column; k++)
                 sum -= at_band((const double (*)[BAND + 1])band, row, k) * at_band((const double (*)[BAND + 1])band, column, k);
             if (column == row)
-                band[row][BAND] = sum > 1e-12 ? sqrt(sum) : 1;
+                band[row][BAND] = sum > LEAST_PIVOT ? sqrt(sum) : 1;
             else
                 band[row][BAND - (row - column)] = sum / band[column][BAND];
         }
+}
+
+/* x = (L L^T)^-1 x, one coordinate; `step` apart */
+static void solve_band(const double (*band)[BAND + 1], uint32_t n, double *x, size_t step)
+{
+    for (uint32_t row = 0; row < n; row++) {
+        double sum = x[row * step];
+        for (uint32_t d = 1; d <= BAND && d <= row; d++)
+            sum -= band[row][BAND - d] * x[(row - d) * step];
+        x[row * step] = sum / band[row][BAND];
+    }
+    for (uint32_t row = n; row-- > 0;) {
+        double sum = x[row * step];
+        for (uint32_t d = 1; d <= BAND && row + d < n; d++)
+            sum -= band[row + d][BAND - d] * x[(row + d) * step];
+        x[row * step] = sum / band[row][BAND];
+    }
+}
+
+/* The move of the root is coupled with all vertices, as an arrow's point is: by column a = own_root with the band B.
+ * Kept are B^-1 a, from entry 1 on, and in entry 0 what is left of the root's own weight, a^T B^-1 a taken off. */
+static void factor_root(const struct guide_system *system, uint32_t g)
+{
+    uint32_t m = system->m;
+    const double *own = own_entry(system, g);
+    double *arrow = system->arrow + (size_t)g * m;
+    arrow[0] = system->hold[(size_t)g * m] + root_with_root(system, own);
+    for (uint32_t j = 1; j < m; j++)
+        arrow[j] = own_root(system, own, j);
+    solve_band((const double (*)[BAND + 1])(system->band + (size_t)g * (m - 1)), m - 1, arrow + 1, 1);
+    for (uint32_t j = 1; j < m; j++)
+        arrow[0] -= own_root(system, own, j) * arrow[j];
 }
 
 static void factor_row(void *user, uint32_t g, uint32_t thread)
@@ -215,29 +296,24 @@ static void factor_row(void *user, uint32_t g, uint32_t thread)
     (void)thread;
     fill_block(system, g, band);
     factor(band, system->m - 1);
+    factor_root(system, g);
 }
 
-/* z = (L L^T)^-1 r of one guide */
+/* z = (the guide's own block)^-1 r */
 static void precondition(const struct guide_system *system, uint32_t g)
 {
-    uint32_t n = system->m - 1;
-    const double (*band)[BAND + 1] = (const double (*)[BAND + 1])(system->band + (size_t)g * n);
-    const double (*r)[3] = (const double (*)[3])(system->r + (size_t)g * system->m + 1);
-    double (*z)[3] = system->z + (size_t)g * system->m + 1;
-    memset(z[-1], 0, sizeof z[-1]);
+    uint32_t m = system->m;
+    const double (*band)[BAND + 1] = (const double (*)[BAND + 1])(system->band + (size_t)g * (m - 1));
+    const double *arrow = system->arrow + (size_t)g * m;
+    double (*z)[3] = system->z + (size_t)g * m;
+    memcpy(z, system->r + (size_t)g * m, m * sizeof *z);
     for (int c = 0; c < 3; c++) {
-        for (uint32_t row = 0; row < n; row++) {
-            double sum = r[row][c];
-            for (uint32_t d = 1; d <= BAND && d <= row; d++)
-                sum -= band[row][BAND - d] * z[row - d][c];
-            z[row][c] = sum / band[row][BAND];
-        }
-        for (uint32_t row = n; row-- > 0;) {
-            double sum = z[row][c];
-            for (uint32_t d = 1; d <= BAND && row + d < n; d++)
-                sum -= band[row + d][BAND - d] * z[row + d][c];
-            z[row][c] = sum / band[row][BAND];
-        }
+        for (uint32_t j = 1; j < m; j++)
+            z[0][c] -= arrow[j] * z[j][c];
+        z[0][c] = arrow[0] > LEAST_PIVOT ? z[0][c] / arrow[0] : 0;
+        solve_band(band, m - 1, &z[1][c], 3);
+        for (uint32_t j = 1; j < m; j++)
+            z[j][c] -= arrow[j] * z[0][c];
     }
 }
 
@@ -274,7 +350,7 @@ static void residual_row(void *user, uint32_t g, uint32_t thread)
     (void)thread;
     for (uint32_t j = 0; j < system->m; j++)
         for (int c = 0; c < 3; c++)
-            system->r[first + j][c] = j ? system->pull[first + j][c] - system->q[first + j][c] : 0;
+            system->r[first + j][c] = system->pull[first + j][c] - system->q[first + j][c];
     system->partial[g] = dot((const double (*)[3])(system->pull + first), (const double (*)[3])(system->pull + first), system->m);
 }
 

@@ -6,18 +6,20 @@
 #include "fit/mean_strands.h"
 #include "fit/sparse.h"
 
-/* Minimise over shapes s (s_g1 = 0)
+/* Minimise over shapes s (s_g0 = 0) and moves t of operator guides' roots, towards which strands close in,
  *     sum_i |E[x_i] - target_i|^2  +  nu along sum_g,j |s_g,j-1 - 3 s_gj + 3 s_g,j+1 - s_g,j+2|^2
  *                                  +  nu across sum_j |(L s_j)|^2  +  sum_gj hold_gj |s_gj - place_gj|^2
- * where nu = n / n_guides, so that the weights mean the same for any number of strands. */
+ * where nu = n / n_guides, so that the weights mean the same for any number of strands. Where vectors have a row for
+ * each vertex, row 0 is t, of guides that are no operator guide 0; `hold` and `place` of row 0 are t's. */
 struct guide_system {
     uint32_t n_guides, m;
-    struct sparse matrix;     /* of the data: powers of rest (0, 1, 2 of clump); [3] across */
+    struct sparse matrix;     /* of the data: own shapes, own and clumped, clumped and own, clumped; across */
     double (*power)[3];       /* [m] rest^2, rest clump, clump^2 */
     double along;             /* times nu */
     double *hold;             /* [n_guides * m] */
     double (*pull)[3];        /* [n_guides * m] right-hand side, `hold` included */
     double (*band)[4];        /* [n_guides * (m - 1)] Cholesky factor of each guide's own block: (j, j-3..j) */
+    double *arrow;            /* [n_guides * m] of the root's move with it */
     double (*r)[3], (*z)[3], (*p)[3], (*q)[3]; /* [n_guides * m] of the solver */
     double *partial;          /* [n_guides] */
     const struct groom_allocator *allocator;

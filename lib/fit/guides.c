@@ -17,6 +17,7 @@
 
 #include "base/memory.h"
 #include "base/progress.h"
+#include "fit/bundles.h"
 #include "fit/guide_laplacian.h"
 #include "fit/guide_system.h"
 #include "fit/guides.h"
@@ -34,6 +35,8 @@ enum phase { SOLVE, ASSIGN, ENDED };
 #define TOLERANCE_CHOOSING 1e-3
 #define ITERATIONS_CHOOSING 40
 #define ROUNDS_AT_HEAD 2
+#define HOLD_ROOT_EXPECTED 0.1 /* of an operator guide in the middle of its strands, over the weight of their vertices; */
+#define HOLD_ROOT_KNOWN 0.03   /* where it is, where random numbers are known, and scatter less */
 #define HOLD 1.0      /* of a vertex at the head, over the weight of a guide's strands */
 #define ASKED 8       /* strands of a guide that are asked whether they are in the head */
 #define FARTHEST 100.0 /* vertex from its root, over the size of the hair */
@@ -44,7 +47,8 @@ struct solution {
     struct mean_strands mean;
     struct sparse laplacian;
     struct guide_system system;
-    double (*shape)[3];     /* [n_guides * m] of the target's size, from the root */
+    double (*shape)[3];     /* [n_guides * m] of the target's size, from the root; while solving rows 0: its move */
+    double (*move)[3];      /* [n_guides] of the roots, then */
     double (*line)[3];      /* [m] */
     double *partial;        /* of the loss */
     float (*direction)[3];  /* [n_guides] at the root, unit */
@@ -70,7 +74,8 @@ static void points_of(const struct solution *solution, uint32_t g, float (*out)[
 {
     const struct groom_fit *fit = solution->fit;
     float root[3];
-    memcpy(root, fit->groom->guides[(size_t)g * fit->m], sizeof root);
+    for (int c = 0; c < 3; c++)
+        root[c] = (float)(fit->groom->guides[(size_t)g * fit->m][c] + fit->scale * solution->move[g][c]);
     for (uint32_t j = 0; j < fit->m; j++)
         for (int c = 0; c < 3; c++)
             out[j][c] = (float)(root[c] + fit->scale * solution->shape[(size_t)g * fit->m + j][c]);
@@ -124,6 +129,69 @@ static void even_out(double (*shape)[3], double (*line)[3], uint32_t m)
     }
 }
 
+/* --- where operator guides stand -------------------------------------------------------------------- */
+
+/* Strands close in on their operator guide: where it stands shows in how. It is looked for around the middle of its
+ * strands, the farther from there the less likely; where random numbers are known around where it was found so far. */
+static groom_status expect_roots(struct solution *solution, int known, const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_fit *fit = solution->fit;
+    const struct groom_allocator *allocator = memory_allocator(context);
+    struct bundle_place *place = memory_array(allocator, fit->groom->n_operator_guides, sizeof *place);
+    if (!place)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for the places of %u operator guides", fit->groom->n_operator_guides);
+    bundles_places(fit, place);
+    for (uint32_t o = 0; o < fit->groom->n_operator_guides; o++) {
+        size_t root = (size_t)fit->groom->operator_guide[o] * fit->m;
+        double weight = (known ? HOLD_ROOT_KNOWN : HOLD_ROOT_EXPECTED) * place[o].n * fit->m;
+        solution->system.hold[root] = weight;
+        for (int c = 0; !known && c < 3; c++)
+            solution->system.pull[root][c] += weight * (place[o].middle[c] - fit->groom->guides[root][c]) / fit->scale;
+    }
+    memory_release(allocator, place, fit->groom->n_operator_guides, sizeof *place);
+    return GROOM_OK;
+}
+
+/* Moves of roots out of the shapes, which begin at 0 then; and back. */
+static void take_moves(struct solution *solution)
+{
+    const struct groom_fit *fit = solution->fit;
+    for (uint32_t g = 0; g < fit->n_guides; g++) {
+        double *first = solution->shape[(size_t)g * fit->m];
+        memcpy(solution->move[g], first, sizeof solution->move[g]);
+        memset(first, 0, sizeof *solution->shape);
+    }
+}
+
+static void return_moves(struct solution *solution)
+{
+    for (uint32_t g = 0; g < solution->fit->n_guides; g++)
+        memcpy(solution->shape[(size_t)g * solution->fit->m], solution->move[g], sizeof solution->move[g]);
+}
+
+/* Roots onto the head next to where they have moved, the tips not, towards which strands close in. */
+static void seat_roots(struct solution *solution)
+{
+    const struct groom_fit *fit = solution->fit;
+    for (uint32_t o = 0; fit->bvh && o < fit->groom->n_operator_guides; o++) {
+        uint32_t g = fit->groom->operator_guide[o], m = fit->m;
+        double (*shape)[3] = solution->shape + (size_t)g * m, *move = solution->move[g];
+        const float *root = fit->groom->guides[(size_t)g * m];
+        struct groom_surface_point surface;
+        float at[3];
+        for (int c = 0; c < 3; c++)
+            at[c] = (float)(root[c] + fit->scale * move[c]);
+        if ((move[0] == 0 && move[1] == 0 && move[2] == 0) || !groom_bvh_closest(fit->bvh, at, INFINITY, &surface))
+            continue;
+        for (int c = 0; c < 3; c++) {
+            double off = ((double)surface.position[c] - root[c]) / fit->scale - move[c];
+            move[c] += off;
+            for (uint32_t j = 1; j < m; j++)
+                shape[j][c] -= off * j / (m - 1);
+        }
+    }
+}
+
 /* --- out of the head -------------------------------------------------------------------------- */
 
 /* Whether most of the strands that the guide shapes, of the first few, are in the head at vertex j. */
@@ -148,7 +216,8 @@ static void hold_at(struct solution *solution, uint32_t g, uint32_t j, const flo
     double weight = HOLD * fit->n / fit->n_guides;
     solution->system.hold[v] = weight;
     for (int c = 0; c < 3; c++)
-        solution->system.pull[v][c] += weight * ((double)place[c] - fit->groom->guides[(size_t)g * fit->m][c]) / fit->scale;
+        solution->system.pull[v][c] += weight * (((double)place[c] - fit->groom->guides[(size_t)g * fit->m][c]) / fit->scale -
+                                                 solution->move[g][c]);
 }
 
 /* By the side of the nearest face, which is quick, and, of those, by what winds around. */
@@ -274,12 +343,13 @@ static groom_status solution_init(struct solution *solution, struct groom_fit *f
     groom_status st;
     *solution = (struct solution){.fit = fit};
     solution->shape = memory_array(allocator, size, sizeof *solution->shape);
+    solution->move = memory_array_zero(allocator, fit->n_guides, sizeof *solution->move);
     solution->line = memory_array(allocator, fit->m, sizeof *solution->line);
     solution->partial = memory_array(allocator, mean_strands_pieces(fit->n), sizeof *solution->partial);
     solution->direction = memory_array(allocator, fit->n_guides, sizeof *solution->direction);
     solution->point = memory_array(allocator, size, sizeof *solution->point);
     solution->surface = memory_array(allocator, size, sizeof *solution->surface);
-    if (!solution->shape || !solution->line || !solution->partial || !solution->direction || !solution->point ||
+    if (!solution->shape || !solution->move || !solution->line || !solution->partial || !solution->direction || !solution->point ||
         !solution->surface)
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the shapes of %u guides", fit->n_guides);
     load_shapes(solution);
@@ -295,8 +365,12 @@ static groom_status solution_init(struct solution *solution, struct groom_fit *f
     if (across == GROOM_FIT_AUTO &&
         (st = choose_across(solution, along_of(cycles, fit->m), &across, context, diag)) != GROOM_OK)
         return st;
-    return guide_system_init(&solution->system, &solution->mean, &solution->laplacian, along_of(cycles, fit->m), across,
-                             context, diag);
+    st = guide_system_init(&solution->system, &solution->mean, &solution->laplacian, along_of(cycles, fit->m), across,
+                           context, diag);
+    int clumps = solution->mean.n_parts > fit->groom->n_instancing;
+    if (st == GROOM_OK && clumps)
+        st = expect_roots(solution, known, context, diag);
+    return st;
 }
 
 static void solution_finish(struct solution *solution, const struct groom_context *context)
@@ -308,6 +382,7 @@ static void solution_finish(struct solution *solution, const struct groom_contex
     mean_strands_finish(&solution->mean);
     sparse_finish(&solution->laplacian);
     memory_release(allocator, solution->shape, size, sizeof *solution->shape);
+    memory_release(allocator, solution->move, fit->n_guides, sizeof *solution->move);
     memory_release(allocator, solution->line, fit->m, sizeof *solution->line);
     memory_release(allocator, solution->partial, mean_strands_pieces(fit->n), sizeof *solution->partial);
     memory_release(allocator, solution->direction, fit->n_guides, sizeof *solution->direction);
@@ -344,12 +419,15 @@ static groom_status solve_rounds(struct solution *solution, const struct groom_c
 {
     const struct groom_fit *fit = solution->fit;
     for (uint32_t round = 0; round <= ROUNDS_AT_HEAD; round++) {
+        return_moves(solution);
         guide_system_solve(&solution->system, solution->shape, TOLERANCE, MOST_ITERATIONS, context);
+        take_moves(solution);
         if (progress_cancelled(context))
             return cancelled(diag);
         if (!fit->bvh || round == ROUNDS_AT_HEAD || hold_out_of_head(solution, context) == 0)
             break;
     }
+    seat_roots(solution);
     for (uint32_t g = 0; g < fit->n_guides; g++)
         for (int pass = 0; pass < EVENINGS; pass++)
             even_out(solution->shape + (size_t)g * fit->m, solution->line, fit->m);
@@ -368,7 +446,7 @@ static groom_status solve(struct groom_fit *fit, const struct groom_context *con
         goto out;
     fill_points(&solution);
     exchange_guides(&solution);
-    if ((st = loss_guides(fit, &after, context, diag)) != GROOM_OK) {
+    if ((st = loss_guides(fit, &after, context, diag)) != GROOM_OK || (st = bundles_coordinates(fit, context, diag)) != GROOM_OK) {
         exchange_guides(&solution);
         goto out;
     }
@@ -389,6 +467,8 @@ groom_status guides_refine(struct groom_fit *fit, const struct groom_context *co
     if (st == GROOM_OK) {
         fill_points(&solution);
         exchange_guides(&solution);
+        if ((st = bundles_coordinates(fit, context, diag)) != GROOM_OK)
+            exchange_guides(&solution);
     }
     solution_finish(&solution, context);
     return st;

@@ -263,9 +263,12 @@ static double strand_loss(const struct losing *job, uint32_t i)
         double rest = mean->rest[j];
         for (int c = 0; c < 3; c++) {
             double left = wanted(mean, i, j, c);
-            for (uint32_t p = 0; p < mean->n_parts; p++)
-                left -= (rest * part[p].shape + (1 - rest) * part[p].clumped) *
-                        job->shape[(size_t)part[p].guide * mean->m + j][c];
+            for (uint32_t p = 0; p < mean->n_parts; p++) {
+                const double (*shape)[3] = job->shape + (size_t)part[p].guide * mean->m;
+                left -= (1 - rest) * part[p].clumped * shape[0][c];
+                if (j > 0)
+                    left -= (rest * part[p].shape + (1 - rest) * part[p].clumped) * shape[j][c];
+            }
             sum += left * left;
         }
     }
@@ -313,8 +316,11 @@ static void pull_piece(void *user, uint32_t g, uint32_t thread)
         uint32_t i = mean->member[at] / mean->n_parts;
         for (uint32_t j = 1; j < mean->m; j++) {
             double rest = mean->rest[j], weight = rest * part->shape + (1 - rest) * part->clumped;
-            for (int c = 0; c < 3; c++)
-                out[j][c] += weight * wanted(mean, i, j, c);
+            for (int c = 0; c < 3; c++) {
+                double here = wanted(mean, i, j, c);
+                out[j][c] += weight * here;
+                out[0][c] += (1 - rest) * part->clumped * here;
+            }
         }
     }
 }

@@ -41,14 +41,14 @@ GROOM_MUST_CHECK groom_status mean_strands_init_known(struct mean_strands *mean,
 void mean_strands_finish(struct mean_strands *mean);
 
 /* Mean square distance of a vertex from its target (Eq. 7 over m), in the target's frame.
- * shape    [n_guides][m][3]
+ * shape    [n_guides][m][3]; rows 0: how far the roots of operator guides are moved
  * partial  [pieces of mean_strands_pieces(n)] scratch */
 double mean_strands_loss(const struct mean_strands *mean, const double (*shape)[3], double *partial,
                          const struct groom_context *context);
 uint32_t mean_strands_pieces(uint32_t n);
 
 /* What the strands would have the guides be, times their weights: right-hand side of the normal
- * equations. out [n_guides][m][3], the roots' rows 0 */
+ * equations. out [n_guides][m][3], rows 0: for the roots of operator guides */
 void mean_strands_pull(const struct mean_strands *mean, double (*out)[3], const struct groom_context *context);
 
 #endif

@@ -17,7 +17,6 @@
 
 #include "base/memory.h"
 #include "base/progress.h"
-#include "fit/bundles.h"
 #include "fit/frequencies.h"
 #include "fit/gather.h"
 #include "fit/guides.h"
@@ -41,8 +40,8 @@
 /* --- the row of passes ------------------------------------------------------------------------- */
 
 /* What is looked for: which operator guide each strand follows, the numbers of strands in one operator,
- * those of operator guides, the law that these follow, the last digits of all that a strand has, what these tell of where operator guides stand
- * and how long guides are, or the guides that go with them and the operators' parameters for these guides. */
+ * those of operator guides, the law that these follow, the last digits of all that a strand has, what these tell of
+ * how long guides are, or the guides that go with them and the operators' parameters for these guides. */
 struct pass {
     enum { FOLLOW, STRANDS, CURLS, LAW, POLISH, CENTRE, RESHAPE } kind;
     uint32_t round;
@@ -333,14 +332,13 @@ static void centre_scale(struct groom *groom, struct groom_operator *op)
     }
 }
 
-static groom_status centre_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+static groom_status centre_step(struct groom_fit *fit)
 {
     struct groom *groom = fit->groom;
-    groom_status st = clumps(groom) ? bundles_centre(fit, context, diag) : GROOM_OK;
-    for (uint32_t o = 0; st == GROOM_OK && o < groom->n_operators; o++)
+    for (uint32_t o = 0; o < groom->n_operators; o++)
         if (groom->operators[o].type == GROOM_OPERATOR_SCALE && has_effect(&groom->operators[o]))
             centre_scale(groom, &groom->operators[o]);
-    return st;
+    return GROOM_OK;
 }
 
 static groom_status reshape_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
@@ -370,7 +368,7 @@ static groom_status pass_step(struct groom_fit *fit, const struct pass *pass, co
                               struct groom_diag *diag)
 {
     uint32_t count = step_size(fit, pass);
-    groom_status st = pass->kind == CENTRE    ? centre_step(fit, context, diag)
+    groom_status st = pass->kind == CENTRE    ? centre_step(fit)
                       : pass->kind == RESHAPE ? reshape_step(fit, context, diag)
                                               : search_step(fit, pass, count, context, diag);
     if (st == GROOM_OK)

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define USUAL 0.2 /* quantile of costs: where bundles are small, half of all edges are borders */
 #define ROUNDS 3 /* of moving nodes */
 #define NONE UINT32_MAX
 
@@ -167,7 +168,7 @@ static size_t tidy(const struct region_edge *edge, size_t n_edges, struct region
             out[kept++] = out[e];
         }
     qsort(scratch, kept, sizeof *scratch, compare_doubles);
-    double usual = kept ? scratch[kept / 2] : 0;
+    double usual = kept ? scratch[(size_t)(USUAL * (double)(kept - 1))] : 0;
     for (size_t e = 0; e < kept; e++)
         out[e].cost = usual > 0 ? log(1 + out[e].cost / usual) : 0;
     return kept;

@@ -11,7 +11,7 @@
 struct region_edge { uint32_t a, b; double cost; }; /* a = b: none */
 
 /* Merges n nodes to `wanted` regions (where the graph has more parts than that, the last ones are joined),
- * always the two whose border costs least: the mean over its edges of log(1 + cost / median cost), times
+ * always the two whose border costs least: the mean over its edges of log(1 + cost / usual cost), times
  * na nb / (na + nb) of their nodes, which keeps regions of one size (as in Ward 1963). A border tells apart
  * neighbours of two kinds that means of all that lies behind it do not. Then nodes go where most of the
  * neighbours are that are like them. Ties by index.

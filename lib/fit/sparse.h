@@ -6,7 +6,7 @@
 
 #include "groom/context.h"
 
-#define SPARSE_WIDTH 4
+#define SPARSE_WIDTH 5
 
 struct sparse {
     uint32_t n;

@@ -1,7 +1,6 @@
 /* What holds for the fit of any capture: each style of the generator, and real files where they are. */
 #include <fcntl.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -52,10 +51,10 @@ static float (*dense_of(const struct groom_fit *fit, int with_operators))[3]
     return dense;
 }
 
-/* Mean square distance of the strands without operators from the target, over that of a bald head. */
-static double unexplained(const struct groom_fit *fit)
+/* Mean square distance of the strands, with or without operators, from the target, over that of a bald head. */
+static double unexplained(const struct groom_fit *fit, int with_operators)
 {
-    float (*dense)[3] = dense_of(fit, 0);
+    float (*dense)[3] = dense_of(fit, with_operators);
     double error = 0, all = 0;
     for (size_t v = 0; v < (size_t)fit->n * fit->m; v++)
         for (int c = 0; c < 3; c++) {
@@ -98,22 +97,25 @@ static void is_well_made(const struct groom_fit *fit)
     free(members);
 }
 
-/* most  after `instance_weights`, and after `guides` (0: not looked at) */
-static void fits(const struct groom_strands *strands, const struct groom_mesh *head, double most_weighted,
-                 double most_solved, const char *what)
+/* What may be left unexplained after `instance_weights` and `guides`, and of the whole groom (0: not looked at). */
+struct left { double weighted, solved, whole; };
+
+static void fits(const struct groom_strands *strands, const struct groom_mesh *head, struct left most, const char *what)
 {
     struct groom_fit_options options;
     groom_fit_options_init(GROOM_FIT_DRAFT, &options);
     options.vertices = 40;
     struct groom_fit *fit = fitted(strands, head, &options);
-    double left = unexplained(fit);
-    ck_assert_msg(left < most_weighted, "%s: %g of it unexplained", what, left);
-    if (most_solved > 0) {
+    double left = unexplained(fit, 0);
+    ck_assert_msg(left < most.weighted, "%s: %g of it unexplained", what, left);
+    if (most.solved > 0) {
         go_to(fit, FIT_STAGE_guides + 1);
-        left = unexplained(fit);
-        ck_assert_msg(left < most_solved, "%s: %g of it unexplained by solved guides", what, left);
+        left = unexplained(fit, 0);
+        ck_assert_msg(left < most.solved, "%s: %g of it unexplained by solved guides", what, left);
     }
     go_to(fit, FIT_N_STAGES);
+    left = unexplained(fit, 1);
+    ck_assert_msg(most.whole == 0 || left < most.whole, "%s: %g of it unexplained by the whole groom", what, left);
     is_sane(fit);
     is_well_made(fit);
     ck_assert_uint_eq(fit->groom->n_strands, strands->n_strands);
@@ -127,11 +129,11 @@ static void fits(const struct groom_strands *strands, const struct groom_mesh *h
  * (0.036 where there were 0.042). */
 START_TEST(every_style_is_fitted)
 {
-    static const struct { double weighted, solved; } most[GROOM_SAMPLE_STYLE_COUNT] = {
-        [GROOM_SAMPLE_STRAIGHT] = {0.005, 0.0140}, [GROOM_SAMPLE_WAVY] = {0.009, 0.0065},
-        [GROOM_SAMPLE_CURLY] = {0.008, 0.0086},    [GROOM_SAMPLE_COILY] = {0.016, 0.0285},
-        [GROOM_SAMPLE_SHORT] = {0.013, 0.0159},    [GROOM_SAMPLE_SPIKY] = {0.0155, 0.0540},
-        [GROOM_SAMPLE_BENT] = {0.010, 0.0323}};
+    static const struct left most[GROOM_SAMPLE_STYLE_COUNT] = {
+        [GROOM_SAMPLE_STRAIGHT] = {0.005, 0.0140, 0.0063}, [GROOM_SAMPLE_WAVY] = {0.009, 0.0065, 0.0024},
+        [GROOM_SAMPLE_CURLY] = {0.008, 0.0086, 0.0114},    [GROOM_SAMPLE_COILY] = {0.016, 0.0285, 0.0370},
+        [GROOM_SAMPLE_SHORT] = {0.013, 0.0159, 0.0038},    [GROOM_SAMPLE_SPIKY] = {0.0155, 0.0540, 0.0510},
+        [GROOM_SAMPLE_BENT] = {0.010, 0.0323, 0.0099}};
     struct groom_sample_options options;
     struct groom_sample *sample;
     groom_sample_style style = (groom_sample_style)_i;
@@ -139,8 +141,9 @@ START_TEST(every_style_is_fitted)
     options.n_strands = 2500;
     options.n_vertices = 50;
     ck_ok(groom_sample_create(&options, NULL, &sample, NULL));
-    fits(sample->capture, sample->head, most[style].weighted, most[style].solved, groom_sample_style_name(style));
-    fits(sample->capture, NULL, 1.5 * most[style].weighted, 1.5 * most[style].solved, groom_sample_style_name(style));
+    struct left headless = {1.5 * most[style].weighted, 1.5 * most[style].solved, 1.5 * most[style].whole};
+    fits(sample->capture, sample->head, most[style], groom_sample_style_name(style));
+    fits(sample->capture, NULL, headless, groom_sample_style_name(style));
     groom_sample_destroy(sample);
 }
 END_TEST
@@ -195,14 +198,17 @@ static struct groom_mesh *read_head(const char *path, struct groom_frame frame)
     return head;
 }
 
+/* Of 100 strands many are operator guides themselves, moved to the middle of their bundles and shaped like them: until
+ * guides are solved, they explain less of them (0.121) than clusters alone did (0.070), and in the end more (0.0118
+ * in place of 0.0157). */
 START_TEST(real_captures_are_fitted)
 {
-    static const struct { const char *strands, *head; double unit_m; groom_up up; double most; } rows[] = {
-        {"harolongo/hair.data", "harolongo/body.obj", 0.01, GROOM_UP_Y, 0.02},
-        {"sintel/hair.tfx", "sintel/head.obj", 1, GROOM_UP_Y, 0.021},
-        {"combover/hair.data", "combover/body.obj", 1, GROOM_UP_Z, 0.035},
-        {"mohawk/hair.tfx", NULL, 1, GROOM_UP_Y, 0.027},
-        {"bangs100/Bangs_100.data", NULL, 0.001, GROOM_UP_Z, 0.072},
+    static const struct { const char *strands, *head; double unit_m; groom_up up; struct left most; } rows[] = {
+        {"harolongo/hair.data", "harolongo/body.obj", 0.01, GROOM_UP_Y, {0.02, 0, 0.0042}},
+        {"sintel/hair.tfx", "sintel/head.obj", 1, GROOM_UP_Y, {0.021, 0, 0.0180}},
+        {"combover/hair.data", "combover/body.obj", 1, GROOM_UP_Z, {0.035, 0, 0.0385}},
+        {"mohawk/hair.tfx", NULL, 1, GROOM_UP_Y, {0.027, 0, 0.0110}},
+        {"bangs100/Bangs_100.data", NULL, 0.001, GROOM_UP_Z, {0.181, 0, 0.0178}},
     };
     const char *path = test_shared_data(rows[_i].strands);
     if (!path)
@@ -210,7 +216,7 @@ START_TEST(real_captures_are_fitted)
     struct groom_frame frame = frame_of(rows[_i].unit_m, rows[_i].up);
     struct groom_strands *strands = read_strands(path, frame);
     struct groom_mesh *head = rows[_i].head ? read_head(test_shared_data(rows[_i].head), frame) : NULL;
-    fits(strands, head, rows[_i].most, 0, rows[_i].strands);
+    fits(strands, head, rows[_i].most, rows[_i].strands);
     groom_mesh_destroy(head);
     groom_strands_destroy(strands);
 }
