@@ -85,7 +85,7 @@ const struct option_row options_table[] = {
     {"/stages/operators", OPTION_GROUP, 0, ALL(0), 0, 0, "The parameters of the operators (Section 5.5)."},
     ROW(operators, method, OPTION_METHOD, 0, 0, 0, 0, 1,
         "direct: statistics of neighbouring strands are matched. paper: Adam on shape, scale and clump in turn (Eqs. 11 to 18)."),
-    ROW(operators, pairs, OPTION_U32, 500, 1500, 3000, 1, 100000,
+    ROW(operators, pairs, OPTION_U32, 1000, 1500, 3000, 1, 100000,
         "Pairs of neighbouring strands of which statistics are matched."),
     ROW(operators, refinements, OPTION_U32, 7, 11, 30, 0, 1000,
         "Steps of refinement at most; it stops where none gets lower. 0 leaves the operators as they started."),
