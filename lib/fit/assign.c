@@ -5,6 +5,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "geometry/side.h"
 
 #define STRANDS_PER_PIECE 64
 #define CANDIDATES 24 /* operator guides that a strand may go to, the nearest one counted */
@@ -39,22 +40,13 @@ groom_status assign_nearest(struct groom *groom, const struct groom_context *con
 
 /* --- out of the head ---------------------------------------------------------------- */
 
-static int crosses(const struct groom_bvh *head, const float a[3], const float b[3])
-{
-    float direction[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-    return groom_bvh_occluded(head, a, direction, 0, 1);
-}
-
-/* A polyline changes sides only where it crosses the surface, and a ray is a hundred times cheaper
- * than the question inside or outside. */
 uint32_t assign_buried(const struct groom_bvh *head, const float (*points)[3], uint32_t n, float clearance)
 {
+    struct side_walk walk = side_walk_begin(head);
     struct groom_surface_point near;
     uint32_t buried = 0;
-    int inside = 0;
     for (uint32_t j = 1; j < n; j++) {
-        if (j == 1 || crosses(head, points[j - 1], points[j]))
-            inside = groom_bvh_inside(head, points[j]);
+        int inside = side_walk(&walk, points[j]);
         buried += inside && !groom_bvh_closest(head, points[j], clearance, &near);
     }
     return buried;

@@ -5,6 +5,7 @@
 #include "base/memory.h"
 #include "base/progress.h"
 #include "base/checksum.h"
+#include "fit/head_planes.h"
 #include "fit/state.h"
 #include "fit/unseen.h"
 #include "groom/mesh.h"
@@ -74,6 +75,7 @@ void groom_fit_destroy(struct groom_fit *fit)
     memory_release(allocator, fit->roots, fit->n, sizeof *fit->roots);
     memory_release(allocator, fit->root_uv, fit->n, sizeof *fit->root_uv);
     memory_release(allocator, fit->target, (size_t)fit->n * fit->m, sizeof *fit->target);
+    memory_release(fit->allocator, fit->head_plane, (size_t)fit->n * head_planes_of(fit->m), sizeof *fit->head_plane);
     unseen_finish(fit);
     memory_release(allocator, fit->centroids, (size_t)fit->n_guides * fit->m, sizeof *fit->centroids);
     memory_release(allocator, fit->cluster_of, fit->n, sizeof *fit->cluster_of);

@@ -16,7 +16,7 @@ groom_status gather_strands(const struct groom_fit *fit, const uint32_t *strand,
     if ((st = groom_evaluate(groom, 0, n, evaluated->points, context, diag)) != GROOM_OK ||
         (st = groom_strands_resample(evaluated, fit->m, fitted, context, diag)) != GROOM_OK)
         goto out;
-    for (uint32_t i = 0; i < n; i++)
+    for (uint32_t i = 0; target && i < n; i++)
         for (uint32_t j = 0; j < fit->m; j++)
             for (int c = 0; c < 3; c++)
                 target[(size_t)i * fit->m + j][c] =

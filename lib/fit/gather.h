@@ -6,7 +6,7 @@
 
 /* Evaluated as the groom stands, and resampled as the target was; both in metres.
  * strand          [n] indices
- * fitted, target  [n * m] out
+ * fitted, target  [n * m] out; target: NULL where it is not wanted
  * returns  GROOM_OK, GROOM_ENOMEM */
 GROOM_MUST_CHECK groom_status gather_strands(const struct groom_fit *fit, const uint32_t *strand, uint32_t n,
                                              float (*fitted)[3], float (*target)[3],

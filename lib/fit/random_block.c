@@ -4,10 +4,11 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "fit/head_planes.h"
 
 /* --- life ------------------------------------------------------------------------------- */
 
-static size_t memory_lanes(uint32_t m) { return (size_t)(4 + 4 + 3 * RANDOM_BLOCK_WEIGHTS) * m + STRAND_ERROR_SCRATCH(m); }
+static size_t memory_lanes(uint32_t m) { return (size_t)(4 + 4 + 4 + 3 * RANDOM_BLOCK_WEIGHTS) * m + STRAND_ERROR_SCRATCH(m); }
 
 groom_status random_block_memory_init(struct random_search_memory *memory, uint32_t m, uint32_t n_active,
                                       const struct groom_allocator *allocator)
@@ -19,7 +20,8 @@ groom_status random_block_memory_init(struct random_search_memory *memory, uint3
         return GROOM_ENOMEM;
     memory->target.point = memory->memory;
     memory->target.inverse_chord = memory->target.point + (size_t)3 * m;
-    memory->scratch = memory->target.inverse_chord + m;
+    memory->plane = memory->target.inverse_chord + m;
+    memory->scratch = memory->plane + (size_t)4 * m;
     memory->blend = memory->scratch + STRAND_ERROR_SCRATCH(m);
     memory->toward = memory->blend + (size_t)4 * m;
     return GROOM_OK;
@@ -33,12 +35,13 @@ void random_block_memory_finish(struct random_search_memory *memory, uint32_t m,
 
 /* --- the chain ----------------------------------------------------------------------------- */
 
-struct block random_block_range(uint32_t first, uint32_t n)
+struct block random_block_range(const struct random_search *search, uint32_t first, uint32_t n)
 {
     uint32_t strand[LANES];
-    for (uint32_t l = 0; l < LANES; l++)
-        strand[l] = first + l;
-    return block_of(strand, n < LANES ? n : LANES);
+    n = n < LANES ? n : LANES;
+    for (uint32_t l = 0; l < n; l++)
+        strand[l] = search->only ? search->only[first + l] : first + l;
+    return block_of(strand, n);
 }
 
 static int is_left_out(const struct random_search *search, uint32_t active) { return search->leave_out >> active & 1; }
@@ -49,6 +52,37 @@ static void apply(const struct random_search *search, struct random_search_memor
     groom_operator_type type = search->plan.groom->operators[search->plan.active[active]].type;
     x.fallen = NULL; /* operators may be left out, or changed */
     kernel_of(type)->forward[search->plan.variant](&memory->in[active], x, y, memory->w.scratch);
+}
+
+/* Planes where the target is inside: through the target. */
+static void let_in_with_target(const struct random_search *search, struct random_search_memory *memory)
+{
+    uint32_t m = search->fit->m;
+    for (uint32_t k = 0; k < head_planes_of(m); k++) {
+        const lanes *p = (const lanes *)memory->target.point + (size_t)3 * head_plane_vertex(k, m);
+        lanes *plane = memory->plane + (size_t)4 * k;
+        FOR_LANES(l)
+        {
+            float outside = plane[0][l] * p[0][l] + plane[1][l] * p[1][l] + plane[2][l] * p[2][l] + plane[3][l];
+            plane[3][l] -= at_most(outside, 0.0f);
+        }
+    }
+}
+
+static void load_planes(const struct random_search *search, struct random_search_memory *memory, const struct block *block)
+{
+    const struct groom_fit *fit = search->fit;
+    uint32_t n = head_planes_of(fit->m);
+    const float *row[LANES];
+    memory->target.plane = NULL;
+    if (!fit->head_plane)
+        return;
+    for (uint32_t l = 0; l < LANES; l++)
+        row[l] = fit->head_plane[(size_t)block->strand[l] * n].normal;
+    block_from_rows(row, NULL, 4 * n, memory->plane);
+    if (!search->out_of_head)
+        let_in_with_target(search, memory);
+    memory->target.plane = memory->plane;
 }
 
 static void load_target(const struct random_search *search, struct random_search_memory *memory,
@@ -86,6 +120,7 @@ void random_block_load(const struct random_search *search, struct random_search_
                        uint32_t active)
 {
     load_target(search, memory, block);
+    load_planes(search, memory, block);
     plan_load(&search->plan, block, &memory->w);
     for (uint32_t a = 0; a < search->plan.n_active; a++)
         memory->in[a] = plan_inputs(&search->plan, block, &memory->w, a);

@@ -14,6 +14,7 @@ struct random_search_memory {
     struct kernel_inputs in[GROOM_FIT_MAX_OPERATORS];
     lanes *memory;             /* of all that follows */
     struct strand_error_target target;
+    lanes *plane;              /* [4 * head_planes_of(m)] the target's, where there is a head */
     lanes *scratch;            /* of strand_error */
     lanes *blend;              /* [3m] the block with other weights, and [m] its arc lengths */
     lanes *toward;             /* [RANDOM_BLOCK_WEIGHTS][3m] what a weight of 1 more adds to it */
@@ -25,8 +26,8 @@ groom_status random_block_memory_init(struct random_search_memory *memory, uint3
                                       const struct groom_allocator *allocator);
 void random_block_memory_finish(struct random_search_memory *memory, uint32_t m, const struct groom_allocator *allocator);
 
-/* Strands first .. first + n - 1, LANES of them at most. */
-struct block random_block_range(uint32_t first, uint32_t n);
+/* Strands first .. first + n - 1, of `only` where it is given; LANES of them at most. */
+struct block random_block_range(const struct random_search *search, uint32_t first, uint32_t n);
 
 /* The block's strands up to the operator in question, their targets, the operators' inputs. */
 void random_block_load(const struct random_search *search, struct random_search_memory *memory, const struct block *block,

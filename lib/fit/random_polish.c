@@ -203,7 +203,7 @@ static void polish_piece(void *user, uint32_t piece, uint32_t thread)
     uint32_t begin = piece * RANDOM_BLOCK_PIECE, end = begin + RANDOM_BLOCK_PIECE;
     end = end < job->count ? end : job->count;
     for (uint32_t i = begin; i < end; i += LANES) {
-        struct block block = random_block_range(job->first + i, end - i);
+        struct block block = random_block_range(job->search, job->first + i, end - i);
         polish_block(job, &job->search->memory[thread], &block);
     }
 }

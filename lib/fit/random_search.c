@@ -10,6 +10,7 @@
 
 #define MOST_RATES 33          /* frequencies of a curl that are tried */
 #define PHASES 6               /* in a turn */
+#define MOST_INSTANCES 8       /* guides of a strand */
 #define LOCAL 5                /* both, around what there is */
 #define LOCAL_PASSES 2
 #define TURNS_PER_RATE 0.3     /* at a strand's tip from one frequency to the next */
@@ -96,7 +97,7 @@ static void search_piece(void *user, uint32_t piece, uint32_t thread)
     uint32_t begin = piece * RANDOM_BLOCK_PIECE, end = begin + RANDOM_BLOCK_PIECE;
     end = end < job->count ? end : job->count;
     for (uint32_t i = begin; i < end; i += LANES) {
-        struct block block = random_block_range(job->first + i, end - i);
+        struct block block = random_block_range(job->search, job->first + i, end - i);
         search_block(job, &job->search->memory[thread], &block);
     }
 }
@@ -371,7 +372,8 @@ struct guides_job {
     float gain;
 };
 
-static void follow_block(const struct guides_job *job, struct random_search_memory *memory, const struct block *block)
+static void follow_block(const struct guides_job *job, struct random_search_memory *memory, const struct block *block,
+                         const uint32_t *candidate)
 {
     uint32_t *follows = job->search->fit->groom->operator_guide_of, best[LANES];
     lanes error, least;
@@ -383,7 +385,7 @@ static void follow_block(const struct guides_job *job, struct random_search_memo
         least[l] *= 1 - job->gain;
     for (uint32_t c = 0; c < job->n_candidates; c++) {
         for (uint32_t l = 0; l < block->n; l++) {
-            uint32_t guide = job->candidate[(size_t)(block->strand[l] - job->first) * job->n_candidates + c];
+            uint32_t guide = candidate[(size_t)l * job->n_candidates + c];
             if (guide != UINT32_MAX)
                 follows[block->strand[l]] = guide;
         }
@@ -405,8 +407,8 @@ static void follow_piece(void *user, uint32_t piece, uint32_t thread)
     uint32_t begin = piece * RANDOM_BLOCK_PIECE, end = begin + RANDOM_BLOCK_PIECE;
     end = end < job->count ? end : job->count;
     for (uint32_t i = begin; i < end; i += LANES) {
-        struct block block = random_block_range(job->first + i, end - i);
-        follow_block(job, &job->search->memory[thread], &block);
+        struct block block = random_block_range(job->search, job->first + i, end - i);
+        follow_block(job, &job->search->memory[thread], &block, job->candidate + (size_t)i * job->n_candidates);
     }
 }
 
@@ -415,4 +417,101 @@ void random_search_guides(struct random_search *search, uint32_t first, uint32_t
 {
     struct guides_job job = {search, candidate, first, count, n_candidates, gain};
     parallel_for(context, (count + RANDOM_BLOCK_PIECE - 1) / RANDOM_BLOCK_PIECE, follow_piece, &job);
+}
+
+/* --- errors ------------------------------------------------------------------------------------------ */
+
+struct errors_job { struct random_search *search; uint32_t count; float *error; };
+
+static void errors_piece(void *user, uint32_t piece, uint32_t thread)
+{
+    const struct errors_job *job = user;
+    struct random_search_memory *memory = &job->search->memory[thread];
+    uint32_t begin = piece * RANDOM_BLOCK_PIECE, end = begin + RANDOM_BLOCK_PIECE;
+    end = end < job->count ? end : job->count;
+    for (uint32_t i = begin; i < end; i += LANES) {
+        struct block block = random_block_range(job->search, i, end - i);
+        lanes error;
+        random_block_load(job->search, memory, &block, 0);
+        random_block_evaluate(job->search, memory, random_block_start(memory), 0, error);
+        memcpy(job->error + i, error, block.n * sizeof *error);
+    }
+}
+
+void random_search_errors(struct random_search *search, uint32_t count, float *error, const struct groom_context *context)
+{
+    struct errors_job job = {search, count, error};
+    parallel_for(context, (count + RANDOM_BLOCK_PIECE - 1) / RANDOM_BLOCK_PIECE, errors_piece, &job);
+}
+
+/* --- the guides of a strand ------------------------------------------------------------------------- */
+
+static void set_guides(struct groom *groom, uint32_t strand, const uint32_t guide[MOST_INSTANCES])
+{
+    uint32_t k = groom->n_instancing;
+    for (uint32_t a = 0; a < k; a++) {
+        groom->instancing_guide[(size_t)strand * k + a] = guide[a < MOST_INSTANCES ? a : 0];
+        groom->instancing_weight[(size_t)strand * k + a] = a == 0;
+    }
+}
+
+/* Among the k best so far. */
+static void rank(uint32_t guide, float error, uint32_t k, uint32_t *best, float *least)
+{
+    uint32_t at = k;
+    for (; at > 0 && error < least[at - 1]; at--)
+        if (at < k) {
+            best[at] = best[at - 1];
+            least[at] = least[at - 1];
+        }
+    if (at < k) {
+        best[at] = guide;
+        least[at] = error;
+    }
+}
+
+static void instance_block(const struct guides_job *job, struct random_search_memory *memory, const struct block *block,
+                           const uint32_t *candidate)
+{
+    struct groom *groom = job->search->fit->groom;
+    uint32_t k = groom->n_instancing < MOST_INSTANCES ? groom->n_instancing : MOST_INSTANCES, best[LANES][MOST_INSTANCES];
+    float least[LANES][MOST_INSTANCES];
+    for (uint32_t l = 0; l < LANES; l++)
+        for (uint32_t a = 0; a < MOST_INSTANCES; a++)
+            best[l][a] = candidate[(size_t)(l < block->n ? l : 0) * job->n_candidates], least[l][a] = INFINITY;
+    for (uint32_t c = 0; c < job->n_candidates; c++) {
+        lanes error;
+        for (uint32_t l = 0; l < block->n; l++) {
+            uint32_t guide[MOST_INSTANCES];
+            for (uint32_t a = 0; a < MOST_INSTANCES; a++)
+                guide[a] = candidate[(size_t)l * job->n_candidates + c];
+            if (guide[0] != UINT32_MAX)
+                set_guides(groom, block->strand[l], guide);
+        }
+        random_block_load(job->search, memory, block, 0);
+        random_block_evaluate(job->search, memory, random_block_start(memory), 0, error);
+        for (uint32_t l = 0; l < block->n; l++)
+            if (candidate[(size_t)l * job->n_candidates + c] != UINT32_MAX)
+                rank(candidate[(size_t)l * job->n_candidates + c], error[l], k, best[l], least[l]);
+    }
+    for (uint32_t l = 0; l < block->n; l++)
+        set_guides(groom, block->strand[l], best[l]);
+}
+
+static void instance_piece(void *user, uint32_t piece, uint32_t thread)
+{
+    const struct guides_job *job = user;
+    uint32_t begin = piece * RANDOM_BLOCK_PIECE, end = begin + RANDOM_BLOCK_PIECE;
+    end = end < job->count ? end : job->count;
+    for (uint32_t i = begin; i < end; i += LANES) {
+        struct block block = random_block_range(job->search, job->first + i, end - i);
+        instance_block(job, &job->search->memory[thread], &block, job->candidate + (size_t)i * job->n_candidates);
+    }
+}
+
+void random_search_instances(struct random_search *search, uint32_t count, const uint32_t *candidate, uint32_t n_candidates,
+                             const struct groom_context *context)
+{
+    struct guides_job job = {search, candidate, 0, count, n_candidates, 0};
+    parallel_for(context, (count + RANDOM_BLOCK_PIECE - 1) / RANDOM_BLOCK_PIECE, instance_piece, &job);
 }

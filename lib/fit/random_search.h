@@ -18,6 +18,8 @@ struct random_search {
     struct plan plan;
     uint32_t leave_out; /* bits of active operators that are taken as not there */
     struct strand_error_weights weights;
+    int out_of_head; /* whether all that is in the head costs, or what is deeper in it than the target */
+    const uint32_t *only; /* strands that `first` and `count` below go along, borrowed; NULL: all */
     uint32_t n_threads;
     struct random_search_memory *memory; /* [n_threads] */
     const struct groom_allocator *allocator;
@@ -66,6 +68,15 @@ void random_search_halves(struct random_search *search, uint32_t active, const s
  * gain       share of the error that another one must be better than the present one by */
 void random_search_guides(struct random_search *search, uint32_t first, uint32_t count, const uint32_t *candidate,
                           uint32_t n_candidates, float gain, const struct groom_context *context);
+
+/* error [count] of strands 0 .. count - 1 as they stand. */
+void random_search_errors(struct random_search *search, uint32_t count, float *error, const struct groom_context *context);
+
+/* Other guides for strands first .. first + count - 1: the one with which alone they come nearest to their targets, then
+ * the next, as many as strands have, at no weight.
+ * candidate  [count][n_candidates] guides, UINT32_MAX: none; the first of each is one */
+void random_search_instances(struct random_search *search, uint32_t count, const uint32_t *candidate, uint32_t n_candidates,
+                             const struct groom_context *context);
 
 /* All numbers of strands first .. first + count - 1 at once, and, where it is wanted, their instancing weights:
  * Newton's steps on their errors, from where they are. Weights stay at least 0 and sum to 1.

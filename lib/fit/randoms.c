@@ -11,6 +11,9 @@
  * and at the end of a round its numbers and instancing weights take Newton's steps together
  * (random_polish.c).
  *
+ * All along, to be deeper in the head than its target costs a strand more than to be as far from it elsewhere; what
+ * is in the head at the end is taken out by a pass of its own (head_clear.h).
+ *
  * method "paper" is the paper's own, as a reference (paper_randoms.h). */
 #include <math.h>
 #include <string.h>
@@ -20,6 +23,7 @@
 #include "fit/frequencies.h"
 #include "fit/gather.h"
 #include "fit/guides.h"
+#include "fit/head_clear.h"
 #include "fit/loss_strands.h"
 #include "fit/operators.h"
 #include "fit/paper_randoms.h"
@@ -34,16 +38,19 @@
 #define CANDIDATES 8         /* operator guides near a strand that it may follow */
 #define GAIN 0.3f            /* share of its error that another one must be better by */
 #define CURL_VALUES 256      /* about: values of a curl's numbers that are tried */
+#define DEPTH 10.0           /* what depth in the head costs, over distance */
 #define POLISH_STEPS 2       /* in the last round; 1 in others */
+#define CLEAR_VALUES 100     /* about: as many evaluations as a look for what is in the head costs */
 #define POLISH_VALUES 48     /* about: evaluations of them */
 
 /* --- the row of passes ------------------------------------------------------------------------- */
 
 /* What is looked for: which operator guide each strand follows, the numbers of strands in one operator,
  * those of operator guides, the law that these follow, the last digits of all that a strand has, what these tell of
- * how long guides are, or the guides that go with them and the operators' parameters for these guides. */
+ * how long guides are, or the guides that go with them and the operators' parameters for these guides; at the end, what
+ * is in the head. */
 struct pass {
-    enum { FOLLOW, STRANDS, CURLS, LAW, POLISH, CENTRE, RESHAPE } kind;
+    enum { FOLLOW, STRANDS, CURLS, LAW, POLISH, CENTRE, RESHAPE, CLEAR } kind;
     uint32_t round;
     uint32_t op, active; /* of STRANDS, CURLS and LAW: its index in the chain, and among those that are enabled */
     int wide;            /* of CURLS and LAW: a look at more frequencies than there may be, for the law to begin with */
@@ -95,6 +102,8 @@ static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST
         n += list_numbers(fit->groom, round, 0, passes + n);
         if (n > begin) {
             passes[n++] = (struct pass){.kind = POLISH, .round = round};
+            if (round + 1 == n_rounds && fit->bvh)
+                passes[n++] = (struct pass){.kind = CLEAR, .round = round};
             if (round + 1 < n_rounds) {
                 passes[n++] = (struct pass){.kind = CENTRE, .round = round};
                 passes[n++] = (struct pass){.kind = RESHAPE, .round = round};
@@ -123,7 +132,7 @@ static int is_by_length(const struct groom_fit *fit, const struct pass *pass)
 static uint32_t leave_out(const struct groom_fit *fit, const struct pass *pass)
 {
     uint32_t bits = 0, active = 0;
-    if (pass->round > 0 || pass->kind == POLISH || is_by_length(fit, pass))
+    if (pass->round > 0 || pass->kind == POLISH || pass->kind == CLEAR || is_by_length(fit, pass))
         return 0;
     for (uint32_t o = 0; o < fit->groom->n_operators; o++) {
         const struct groom_operator *op = &fit->groom->operators[o];
@@ -153,9 +162,10 @@ static struct strand_error_weights weights_of(const struct groom_fit *fit, const
     double lambda_d = fit->options.stages.randoms.lambda_d, vertex = loss_before(fit, "vertex");
     double balance = vertex > 0 ? loss_before(fit, "direction") / (vertex * vertex) : 0;
     if (is_by_length(fit, pass))
-        return (struct strand_error_weights){0, 0, (float)(1 / squared)};
-    return (struct strand_error_weights){(float)lambda_d, (float)(lambda_d * balance * fit->options.stages.randoms.lambda_x),
-                                         (float)(fit->options.stages.randoms.lambda_l / squared)};
+        return (struct strand_error_weights){0, 0, (float)(1 / squared), 0};
+    double apart = lambda_d * balance * fit->options.stages.randoms.lambda_x;
+    return (struct strand_error_weights){(float)lambda_d, (float)apart, (float)(fit->options.stages.randoms.lambda_l / squared),
+                                         (float)(DEPTH * apart)};
 }
 
 /* Strands by operator guide. begin [n_gop + 1], member [n] */
@@ -280,6 +290,7 @@ static uint32_t step_size(const struct groom_fit *fit, const struct pass *pass)
     case LAW:
     case CENTRE:
     case RESHAPE: return left;
+    case CLEAR: values = CLEAR_VALUES; break;
     }
     wanted = STEP_WORK / values > 1 ? STEP_WORK / values : 1;
     return wanted < left ? wanted : left;
@@ -305,6 +316,7 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
         random_search_polish(search, fit->iteration, count, is_last(fit, pass) ? POLISH_STEPS : 1,
                              (float)fit->options.stages.randoms.hold, is_last(fit, pass), context);
         return GROOM_OK;
+    case CLEAR: return head_clear(search, fit->iteration, count, context, diag);
     case CENTRE:
     case RESHAPE: break;
     }

@@ -24,6 +24,7 @@ struct groom_fit {
     float (*roots)[3];         /* [n] metres, on the scalp where the strand reaches it */
     float (*root_uv)[2];       /* [n] */
     float (*target)[3];        /* [n * m] (position - centre) / scale */
+    struct head_plane *head_plane; /* [n * head_planes_of(m)] the head beside the target (head_planes.h); NULL without one */
     float centre[3];           /* of all points, metres */
     float scale;               /* metres: root mean square distance of all points from the centre */
     double frame[3][3];        /* the hair's own axes, rows (canonical.h) */

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "fit/head_planes.h"
 #include "model/arc.h"
 
 void strand_error_measure(uint32_t m, struct strand_error_target *target)
@@ -27,6 +28,23 @@ LANES_INLINE void locate(float fraction, float segments, int32_t *index, float *
     *within = at_most(at - (float)*index, 1.0f);
 }
 
+/* Mean square depth in the head. */
+LANES_INLINE void measure_depth(uint32_t m, const lanes *restrict x, const lanes *restrict plane, lanes deep)
+{
+    uint32_t n = head_planes_of(m);
+    memset(deep, 0, sizeof(lanes));
+    for (uint32_t k = 0; k < n; k++, plane += 4) {
+        const lanes *p = x + (size_t)3 * head_plane_vertex(k, m);
+        FOR_LANES(l)
+        {
+            float outside = plane[0][l] * p[0][l] + plane[1][l] * p[1][l] + plane[2][l] * p[2][l] + plane[3][l];
+            float in = at_most(outside, 0.0f);
+            deep[l] += in * in;
+        }
+    }
+    FOR_LANES(l) deep[l] *= 1.0f / (float)n;
+}
+
 /* One corner of a segment a lane; each lane has a segment of its own. */
 LANES_INLINE void gather(const lanes *restrict point, const int32_t *restrict index, int offset, lanes *restrict out)
 {
@@ -39,7 +57,7 @@ LANES_INLINE void error_body(uint32_t m, const lanes *restrict x, const struct s
                              const struct strand_error_weights *weights, lanes *restrict scratch,
                              float *restrict error)
 {
-    lanes *ell = scratch, *at = scratch + m, inverse, along = {0}, apart = {0};
+    lanes *ell = scratch, *at = scratch + m, inverse, along = {0}, apart = {0}, deep = {0};
     float segments = (float)(m - 1);
     arc_measure(m, x, ell, at, inverse);
     for (uint32_t j = 0; j + 1 < m; j++) {
@@ -64,11 +82,13 @@ LANES_INLINE void error_body(uint32_t m, const lanes *restrict x, const struct s
             apart[l] += square * ell[j][l];
         }
     }
+    if (target->plane)
+        measure_depth(m, x, (const lanes *)target->plane, deep);
     FOR_LANES(l)
     {
         float longer = at[m - 1][l] - target->length[l];
         error[l] = weights->direction * (1.0f - along[l] * inverse[l]) + weights->vertex * (apart[l] * inverse[l]) +
-                   weights->length * (longer * longer);
+                   weights->length * (longer * longer) + weights->depth * deep[l];
     }
 }
 

@@ -3,19 +3,21 @@
  * The terms of Chang et al. 2025, Eq. 19, that tell strands apart point by point, as means over arc length,
  * so that two polylines along one curve agree however their vertices are spread:
  *     direction (1 - mean of <d, d^>) + vertex mean |x - x^|^2 + length (l - l^)^2
+ *         + depth mean of depth in the head^2
  * at equal fractions of arc length; d, x: the strand, d^, x^: its target. */
 #ifndef FIT_STRAND_ERROR_H
 #define FIT_STRAND_ERROR_H
 
 #include "model/kernel.h"
 
-struct strand_error_weights { float direction, vertex, length; }; /* 1, 1 / m^2, 1 / m^2 */
+struct strand_error_weights { float direction, vertex, length, depth; }; /* 1, 1 / m^2, 1 / m^2, 1 / m^2 */
 
 /* Targets of a block's strands, relative to their roots, metres. */
 struct strand_error_target {
     lanes *point;         /* [3m] */
     lanes *inverse_chord; /* [m-1] 1 / length of a segment, or 0 */
     lanes length;         /* of the polyline */
+    lanes *plane;         /* [4 * head_planes_of(m)] normals and offsets (head_planes.h), or NULL: there is no head */
 };
 
 /* Fills inverse_chord and length. */

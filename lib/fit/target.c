@@ -7,6 +7,7 @@
 #include "base/progress.h"
 #include "fit/canonical.h"
 #include "fit/head_frame.h"
+#include "fit/head_planes.h"
 #include "fit/outliers.h"
 #include "fit/refine.h"
 #include "fit/state.h"
@@ -354,7 +355,8 @@ groom_status target_create(struct groom_fit *fit, const struct groom_strands *st
         (st = fill_target(fit, strands, outlier, context, diag)) != GROOM_OK ||
         (st = place_roots(fit, strands, outlier, context, diag)) != GROOM_OK)
         goto out;
-    st = unseen_remove(fit, outlier, context, diag);
+    if ((st = unseen_remove(fit, outlier, context, diag)) == GROOM_OK)
+        st = head_planes_create(fit, context, diag);
 out:
     memory_release(memory_allocator(context), outlier, strands->n_strands, 1);
     return st;

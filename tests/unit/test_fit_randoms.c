@@ -47,10 +47,10 @@ START_TEST(the_error_is_none_on_the_same_curve_however_its_vertices_stand)
     helices(400, 0, 0, x);
     helices(400, 0.3f, 0, same);
     helices(400, 0, 0.03f, off);
-    error_of(KERNEL_BASELINE, same, x, (struct strand_error_weights){1, 100, 100}, error);
+    error_of(KERNEL_BASELINE, same, x, (struct strand_error_weights){1, 100, 100, 0}, error);
     for (int l = 0; l < LANES; l++)
         ck_assert_float_le(fabsf(error[l]), 2e-4f);
-    error_of(KERNEL_BASELINE, off, x, (struct strand_error_weights){0, 1, 0}, error);
+    error_of(KERNEL_BASELINE, off, x, (struct strand_error_weights){0, 1, 0, 0}, error);
     for (int l = 0; l < LANES; l++) /* the mean of (0.03 v)^2 */
         ck_assert_float_eq_tol(error[l], 0.0003f, 0.00006f);
 }
@@ -62,8 +62,8 @@ START_TEST(the_error_has_the_same_bits_in_all_variants)
     lanes one, other;
     helices(400, 0.2f, 0.01f, x);
     helices(400, 0, 0, y);
-    error_of(KERNEL_BASELINE, x, y, (struct strand_error_weights){2, 30, 1}, one);
-    error_of(kernel_best_variant(), x, y, (struct strand_error_weights){2, 30, 1}, other);
+    error_of(KERNEL_BASELINE, x, y, (struct strand_error_weights){2, 30, 1, 0}, one);
+    error_of(kernel_best_variant(), x, y, (struct strand_error_weights){2, 30, 1, 0}, other);
     ck_assert_mem_eq(one, other, sizeof one);
 }
 END_TEST

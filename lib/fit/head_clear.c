@@ -1,0 +1,303 @@
+#include "fit/head_clear.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "fit/gather.h"
+#include "geometry/side.h"
+#include "groom/spatial.h"
+
+#define DEEP 0.0005      /* metres in the head of ordinary size that are too deep */
+#define STIFF 10.0f      /* times what depth costs while numbers are looked for */
+#define CANDIDATES 24    /* guides near a strand */
+#define CHUNK 4000       /* strands that are looked at together */
+#define STRANDS_PER_PIECE 16
+#define STEPS 3          /* of Newton */
+#define VALUES 24        /* of a number, over its range */
+#define HALVINGS 3
+#define HOLD 0.001f      /* moving a weight is cheap here */
+
+/* --- how deep ------------------------------------------------------------------------------- */
+
+static float apart(const float a[3], const float b[3])
+{
+    float x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return sqrtf(x * x + y * y + z * z);
+}
+
+/* What strands are like as they stand. */
+struct standing {
+    float *depth;  /* [n] of the deepest vertex but the root, metres */
+    float *beyond; /* [n] how much deeper that is than the deepest of its target */
+    float *error;  /* [n] but for depth */
+};
+
+struct looking {
+    const struct groom_bvh *head;
+    const float (*points)[3], (*target)[3]; /* [n * m] */
+    uint32_t n, m;
+    struct standing *standing;
+};
+
+/* What a vertex is outside, those after it are for as long. */
+static float depth_of(const struct groom_bvh *head, const float (*x)[3], uint32_t m)
+{
+    struct side_walk walk = side_walk_begin(head);
+    float spare = 0, depth = 0;
+    for (uint32_t j = 1; j < m; j++) {
+        struct groom_surface_point near;
+        if ((spare -= apart(x[j - 1], x[j])) > 0 || !groom_bvh_closest(head, x[j], INFINITY, &near))
+            continue;
+        int inside = side_walk(&walk, x[j]);
+        depth = inside ? fmaxf(depth, near.distance) : depth;
+        spare = inside ? 0 : near.distance;
+    }
+    return depth;
+}
+
+static void look_at(const struct looking *job, uint32_t i)
+{
+    float depth = depth_of(job->head, job->points + (size_t)i * job->m, job->m);
+    job->standing->depth[i] = depth;
+    job->standing->beyond[i] = depth > 0 ? depth - depth_of(job->head, job->target + (size_t)i * job->m, job->m) : 0;
+}
+
+static void look_piece(void *user, uint32_t piece, uint32_t thread)
+{
+    const struct looking *job = user;
+    (void)thread;
+    for (uint32_t i = piece * STRANDS_PER_PIECE; i < job->n && i - piece * STRANDS_PER_PIECE < STRANDS_PER_PIECE; i++)
+        look_at(job, i);
+}
+
+/* points, target [n * m] scratch */
+static groom_status measure(struct random_search *search, const uint32_t *strand, uint32_t n, float (*points)[3],
+                            float (*target)[3], struct standing *standing, const struct groom_context *context,
+                            struct groom_diag *diag)
+{
+    const struct groom_fit *fit = search->fit;
+    struct looking job = {fit->bvh, (const float (*)[3])points, (const float (*)[3])target, n, fit->m, standing};
+    groom_status st = gather_strands(fit, strand, n, points, target, context, diag);
+    if (st != GROOM_OK)
+        return st;
+    parallel_for(context, (n + STRANDS_PER_PIECE - 1) / STRANDS_PER_PIECE, look_piece, &job);
+    float price = search->weights.depth;
+    search->weights.depth = 0;
+    search->only = strand;
+    random_search_errors(search, n, standing->error, context);
+    search->weights.depth = price;
+    search->only = NULL;
+    return GROOM_OK;
+}
+
+/* --- what strands have of their own ------------------------------------------------------------ */
+
+/* Of some strands, to be had back. */
+struct kept {
+    const uint32_t *strand; /* [n] borrowed, or NULL: from `first` on */
+    uint32_t first, n, k;
+    uint32_t *guide;  /* [n * k] */
+    float *weight;    /* [n * k] */
+    float *number;    /* [operators][n] of those that draw one a strand */
+};
+
+static int draws_for_strands(const struct groom_operator *op)
+{
+    return groom_operator_random_arrays(op->type) > 0 && !groom_operator_random_per_guide(op->type);
+}
+
+static groom_status keep(struct kept *kept, const struct groom *groom, const uint32_t *strand, uint32_t first, uint32_t n,
+                         const struct groom_allocator *allocator, struct groom_diag *diag)
+{
+    uint32_t k = groom->n_instancing;
+    *kept = (struct kept){strand, first, n, k, memory_array(allocator, (size_t)n * k, sizeof *kept->guide),
+                          memory_array(allocator, (size_t)n * k, sizeof *kept->weight),
+                          memory_array(allocator, (size_t)n * GROOM_FIT_MAX_OPERATORS, sizeof *kept->number)};
+    if (!kept->guide || !kept->weight || !kept->number)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to take %u strands out of the head", n);
+    for (uint32_t at = 0; at < n; at++) {
+        size_t i = strand ? strand[at] : first + at;
+        memcpy(kept->guide + (size_t)at * k, groom->instancing_guide + i * k, k * sizeof *kept->guide);
+        memcpy(kept->weight + (size_t)at * k, groom->instancing_weight + i * k, k * sizeof *kept->weight);
+        for (uint32_t o = 0; o < groom->n_operators; o++)
+            if (draws_for_strands(&groom->operators[o]))
+                kept->number[(size_t)o * n + at] = groom->operators[o].random[0][i];
+    }
+    return GROOM_OK;
+}
+
+static void give_back(const struct kept *kept, struct groom *groom, uint32_t at)
+{
+    size_t k = kept->k, i = kept->strand ? kept->strand[at] : kept->first + at;
+    memcpy(groom->instancing_guide + i * k, kept->guide + at * k, k * sizeof *kept->guide);
+    memcpy(groom->instancing_weight + i * k, kept->weight + at * k, k * sizeof *kept->weight);
+    for (uint32_t o = 0; o < groom->n_operators; o++)
+        if (draws_for_strands(&groom->operators[o]))
+            groom->operators[o].random[0][i] = kept->number[(size_t)o * kept->n + at];
+}
+
+static void kept_finish(struct kept *kept, const struct groom_allocator *allocator)
+{
+    memory_release(allocator, kept->guide, (size_t)kept->n * kept->k, sizeof *kept->guide);
+    memory_release(allocator, kept->weight, (size_t)kept->n * kept->k, sizeof *kept->weight);
+    memory_release(allocator, kept->number, (size_t)kept->n * GROOM_FIT_MAX_OPERATORS, sizeof *kept->number);
+}
+
+/* --- ways out ---------------------------------------------------------------------------------- */
+
+/* Other guides near each strand; one at first, which the polish then mixes. */
+static groom_status choose_guides(struct random_search *search, uint32_t n, const struct groom_context *context,
+                                  struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    const struct groom *groom = search->fit->groom;
+    struct groom_neighbours *index = NULL;
+    float (*uv)[2] = memory_array(allocator, n, sizeof *uv);
+    uint32_t *candidate = memory_array(allocator, (size_t)n * CANDIDATES, sizeof *candidate);
+    groom_status st = uv && candidate ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to choose guides");
+    for (uint32_t at = 0; st == GROOM_OK && at < n; at++)
+        memcpy(uv[at], groom->root_uv[search->only[at]], sizeof *uv);
+    if (st == GROOM_OK)
+        st = groom_neighbours_create(groom->guide_uv[0], groom->n_guides, 2, context, &index, diag);
+    if (st == GROOM_OK &&
+        (st = groom_neighbours_find(index, uv[0], n, CANDIDATES, candidate, NULL, context, diag)) == GROOM_OK)
+        random_search_instances(search, n, candidate, CANDIDATES, context);
+    groom_neighbours_destroy(index);
+    memory_release(allocator, uv, n, sizeof *uv);
+    memory_release(allocator, candidate, (size_t)n * CANDIDATES, sizeof *candidate);
+    return st;
+}
+
+static void search_numbers(struct random_search *search, uint32_t n, const struct groom_context *context)
+{
+    const struct plan *plan = &search->plan;
+    for (uint32_t a = 0; a < plan->n_active; a++) {
+        const struct groom_operator *op = &plan->groom->operators[plan->active[a]];
+        if (draws_for_strands(op))
+            random_search_strands(search, a, 0, n, VALUES, HALVINGS, context);
+    }
+}
+
+/* First all that is in the head, then what is deeper in it than its target: from where it is, from other guides. */
+enum way { WITHDRAWN, NUDGED, BLENDED_ANEW, NUDGED_AGAIN, N_WAYS };
+
+static groom_status take(enum way way, struct random_search *search, uint32_t n, const struct groom_context *context,
+                         struct groom_diag *diag)
+{
+    groom_status st = GROOM_OK;
+    search->out_of_head = way == WITHDRAWN;
+    if (way == BLENDED_ANEW && (st = choose_guides(search, n, context, diag)) == GROOM_OK)
+        search_numbers(search, n, context);
+    if (st == GROOM_OK)
+        random_search_polish(search, 0, n, STEPS, HOLD, 1, context);
+    return st;
+}
+
+/* --- strands -------------------------------------------------------------------------------------- */
+
+struct clearing {
+    struct random_search *search;
+    uint32_t n;
+    uint32_t *strand;             /* [n] those that are too deep */
+    struct standing before, after;
+    float (*points)[3], (*target)[3]; /* [n * m] scratch */
+    float deep;
+};
+
+/* Those that are deep still, or deeper than their targets, in order. */
+static void keep_deep(struct clearing *job, enum way way)
+{
+    uint32_t n = 0;
+    for (uint32_t at = 0; at < job->n; at++)
+        if ((way == WITHDRAWN ? job->before.depth : job->before.beyond)[at] > job->deep) {
+            job->strand[n] = job->strand[at];
+            job->before.depth[n] = job->before.depth[at];
+            job->before.beyond[n] = job->before.beyond[at];
+            job->before.error[n++] = job->before.error[at];
+        }
+    job->n = n;
+}
+
+/* A strand that is deeper in the head than its target comes out at any cost; one that follows it in, only where it comes
+ * out as near to it as it was. */
+static int is_better(const struct clearing *job, uint32_t at)
+{
+    const struct standing *before = &job->before, *after = &job->after;
+    if (before->beyond[at] > job->deep)
+        return after->beyond[at] < before->beyond[at];
+    return after->beyond[at] <= job->deep && after->depth[at] < before->depth[at] && after->error[at] <= before->error[at];
+}
+
+static groom_status try_way(struct clearing *job, enum way way, const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    struct groom *groom = job->search->fit->groom;
+    struct kept kept;
+    groom_status st = keep(&kept, groom, job->strand, 0, job->n, allocator, diag);
+    job->search->only = job->strand;
+    if (st == GROOM_OK && (st = take(way, job->search, job->n, context, diag)) == GROOM_OK &&
+        (st = measure(job->search, job->strand, job->n, job->points, job->target, &job->after, context, diag)) == GROOM_OK)
+        for (uint32_t at = 0; at < job->n; at++) {
+            if (is_better(job, at)) {
+                job->before.depth[at] = job->after.depth[at];
+                job->before.beyond[at] = job->after.beyond[at];
+                job->before.error[at] = job->after.error[at];
+            } else
+                give_back(&kept, groom, at);
+        }
+    kept_finish(&kept, allocator);
+    return st;
+}
+
+static groom_status clear_chunk(struct clearing *job, uint32_t first, uint32_t count, const struct groom_context *context,
+                                struct groom_diag *diag)
+{
+    groom_status st;
+    job->n = count;
+    for (uint32_t at = 0; at < count; at++)
+        job->strand[at] = first + at;
+    if ((st = measure(job->search, job->strand, count, job->points, job->target, &job->before, context, diag)) != GROOM_OK)
+        return st;
+    for (int way = 0; st == GROOM_OK && way < N_WAYS; way++) {
+        keep_deep(job, way);
+        if (job->n > 0)
+            st = try_way(job, way, context, diag);
+    }
+    return st;
+}
+
+#define N_FLOATS 6 /* a strand */
+
+groom_status head_clear(struct random_search *search, uint32_t first, uint32_t count, const struct groom_context *context,
+                        struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    uint32_t size = count < CHUNK ? count : CHUNK, m = search->fit->m;
+    struct clearing job = {.search = search, .deep = (float)DEEP * search->fit->ordinary};
+    struct kept whole;
+    groom_status st = keep(&whole, search->fit->groom, NULL, first, count, allocator, diag);
+    int is_kept = st == GROOM_OK;
+    float *floats = memory_array(allocator, (size_t)size * N_FLOATS, sizeof *floats);
+    job.strand = memory_array(allocator, size, sizeof *job.strand);
+    job.points = memory_array(allocator, (size_t)size * m, sizeof *job.points);
+    job.target = memory_array(allocator, (size_t)size * m, sizeof *job.target);
+    if (st == GROOM_OK && !(floats && job.strand && job.points && job.target))
+        st = groom_fail(diag, GROOM_ENOMEM, "no memory to look for strands in the head");
+    if (st == GROOM_OK) {
+        job.before = (struct standing){floats, floats + size, floats + 2 * (size_t)size};
+        job.after = (struct standing){floats + 3 * (size_t)size, floats + 4 * (size_t)size, floats + 5 * (size_t)size};
+        search->weights.depth *= STIFF;
+    }
+    for (uint32_t at = 0; st == GROOM_OK && at < count; at += size)
+        st = clear_chunk(&job, first + at, count - at < size ? count - at : size, context, diag);
+    for (uint32_t at = 0; is_kept && st != GROOM_OK && at < count; at++) /* a step that fails has changed nothing */
+        give_back(&whole, search->fit->groom, at);
+    kept_finish(&whole, allocator);
+    memory_release(allocator, floats, (size_t)size * N_FLOATS, sizeof *floats);
+    memory_release(allocator, job.strand, size, sizeof *job.strand);
+    memory_release(allocator, job.points, (size_t)size * m, sizeof *job.points);
+    memory_release(allocator, job.target, (size_t)size * m, sizeof *job.target);
+    return st;
+}
