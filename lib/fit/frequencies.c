@@ -147,7 +147,7 @@ static void middle_of(const struct groom *groom, const struct groom_operator *cu
     *variance = pow(ROUGHLY_WIDER * TRUNCATED_DEVIATION * (high - low) / MIDDLE_WIDTH, 2);
 }
 
-groom_status frequencies_restate(struct groom *groom, struct groom_operator *curl, const float (*half)[2], int roughly,
+groom_status frequencies_restate(struct groom *groom, struct groom_operator *curl, const float (*half)[2],
                                  const struct groom_allocator *allocator, struct groom_diag *diag)
 {
     uint32_t n = groom->n_operator_guides;
@@ -158,11 +158,11 @@ groom_status frequencies_restate(struct groom *groom, struct groom_operator *cur
     if (st == GROOM_OK) {
         double frequency = curl->parameter[FREQUENCY], random = curl->parameter[RANDOM_FREQUENCY];
         count_strands(groom, count);
-        if (roughly)
-            middle_of(groom, curl, count, counted, &mean, &variance);
-        else
+        if (half)
             spread_of(groom, curl, count, &mean, &variance);
-        double error = roughly ? 0 : fmin(error_variance(groom, half, square), MOST_ERROR * variance);
+        else
+            middle_of(groom, curl, count, counted, &mean, &variance);
+        double error = half ? fmin(error_variance(groom, half, square), MOST_ERROR * variance) : 0;
         double centre = fmax(frequency + random * mean, 0), found = sqrt(variance) / TRUNCATED_DEVIATION;
         double law = random * sqrt(variance - error) / TRUNCATED_DEVIATION;
         curl->parameter[FREQUENCY] = (float)centre;

@@ -17,11 +17,11 @@ void frequencies_widen(struct groom *groom, struct groom_operator *curl);
 
 /* The law from the frequencies found, and numbers that have the spread that they have by it.
  * half  [n_operator_guides][2] numbers by one half of a curl's strands alone, and by the other, NAN where there are
- *       none: what these do not agree on is no difference of curls
- * roughly  by the middle three fifths of the curls alone: others may have been taken for what they are not
+ *       none: what these do not agree on is no difference of curls. Or NULL: roughly, by the middle three fifths of
+ *       the curls alone, as others may have been taken for what they are not
  * returns GROOM_OK, GROOM_ENOMEM */
 GROOM_MUST_CHECK groom_status frequencies_restate(struct groom *groom, struct groom_operator *curl,
-                                                 const float (*half)[2], int roughly,
-                                                  const struct groom_allocator *allocator, struct groom_diag *diag);
+                                                 const float (*half)[2], const struct groom_allocator *allocator,
+                                                 struct groom_diag *diag);
 
 #endif

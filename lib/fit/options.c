@@ -119,7 +119,7 @@ const struct option_row options_table[] = {
         "Cost of moving an instancing weight by 1, squared, while a strand's numbers are refined with them."),
     ROW(randoms, across, OPTION_REAL, 0.1, 0.1, 0.1, 1e-6, 1e6,
         "Pull of each guide towards its neighbours on the scalp where guides are solved again, between rounds, for the numbers found."),
-    ROW(randoms, refinements, OPTION_U32, 0, 3, 4, 0, 1000,
+    ROW(randoms, refinements, OPTION_U32, 0, 2, 4, 0, 1000,
         "Refinements of the operators' parameters at most, between rounds, for guides solved again; it stops where none gets lower."),
     ROW(randoms, iterations, OPTION_U32, 3000, 3000, 3000, 0, 1000000, "Gradient steps of the paper's method."),
     ROW(randoms, learning_rate, OPTION_REAL, 0.1, 0.1, 0.1, 0, 1e3, "Learning rate of the paper's method."),

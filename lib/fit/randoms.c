@@ -227,11 +227,12 @@ static groom_status restate_frequencies(struct groom_fit *fit, struct random_sea
     const struct groom_allocator *allocator = memory_allocator(context);
     uint32_t n = fit->groom->n_operator_guides;
     float (*half)[2] = memory_array(allocator, n, sizeof *half);
-    if (!half)
-        return groom_fail(diag, GROOM_ENOMEM, "no memory for the frequencies of %u curls", n);
-    groom_status st = search_curls(fit, search, pass, n, half, context, diag);
+    groom_status st = half ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for the frequencies of %u curls", n);
+    if (st == GROOM_OK && !pass->wide)
+        st = search_curls(fit, search, pass, n, half, context, diag);
     if (st == GROOM_OK)
-        st = frequencies_restate(fit->groom, &fit->groom->operators[pass->op], (const float (*)[2])half, pass->wide, allocator, diag);
+        st = frequencies_restate(fit->groom, &fit->groom->operators[pass->op], pass->wide ? NULL : (const float (*)[2])half,
+                                 allocator, diag);
     memory_release(allocator, half, n, sizeof *half);
     return st;
 }

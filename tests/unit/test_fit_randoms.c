@@ -249,7 +249,7 @@ static void restate(struct groom *groom, struct groom_operator *curl, double apa
     for (uint32_t o = 0; o < n; o++)
         for (int h = 0; h < 2; h++)
             half[o][h] = curl->random[0][o] + (float)(h ? apart : -apart);
-    ck_assert_int_eq(frequencies_restate(groom, curl, (const float (*)[2])half, 0, memory_allocator(NULL), &diag), GROOM_OK);
+    ck_assert_int_eq(frequencies_restate(groom, curl, (const float (*)[2])half, memory_allocator(NULL), &diag), GROOM_OK);
     free(half);
 }
 
