@@ -35,6 +35,7 @@ enum phase { SOLVE, ASSIGN, ENDED };
 #define TOLERANCE_CHOOSING 1e-3
 #define ITERATIONS_CHOOSING 40
 #define ROUNDS_AT_HEAD 2
+#define ROUNDS_KNOWN 1          /* of guides that were out of the head already */
 #define HOLD_ROOT_EXPECTED 0.1 /* of an operator guide in the middle of its strands, over the weight of their vertices; */
 #define HOLD_ROOT_KNOWN 0.03   /* where it is, where random numbers are known, and scatter less */
 #define HOLD 1.0      /* of a vertex at the head, over the weight of a guide's strands */
@@ -415,16 +416,16 @@ static void exchange_guides(struct solution *solution)
         }
 }
 
-static groom_status solve_rounds(struct solution *solution, const struct groom_context *context, struct groom_diag *diag)
+static groom_status solve_rounds(struct solution *solution, uint32_t rounds_at_head, const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_fit *fit = solution->fit;
-    for (uint32_t round = 0; round <= ROUNDS_AT_HEAD; round++) {
+    for (uint32_t round = 0; round <= rounds_at_head; round++) {
         return_moves(solution);
         guide_system_solve(&solution->system, solution->shape, TOLERANCE, MOST_ITERATIONS, context);
         take_moves(solution);
         if (progress_cancelled(context))
             return cancelled(diag);
-        if (!fit->bvh || round == ROUNDS_AT_HEAD || hold_out_of_head(solution, context) == 0)
+        if (!fit->bvh || round == rounds_at_head || hold_out_of_head(solution, context) == 0)
             break;
     }
     seat_roots(solution);
@@ -442,7 +443,7 @@ static groom_status solve(struct groom_fit *fit, const struct groom_context *con
     if (st != GROOM_OK)
         goto out;
     if ((st = loss_guides(fit, &before, context, diag)) != GROOM_OK ||
-        (st = solve_rounds(&solution, context, diag)) != GROOM_OK)
+        (st = solve_rounds(&solution, ROUNDS_AT_HEAD, context, diag)) != GROOM_OK)
         goto out;
     fill_points(&solution);
     exchange_guides(&solution);
@@ -463,7 +464,7 @@ groom_status guides_refine(struct groom_fit *fit, const struct groom_context *co
     struct solution solution;
     groom_status st = solution_init(&solution, fit, 1, fit->options.stages.randoms.across, context, diag);
     if (st == GROOM_OK)
-        st = solve_rounds(&solution, context, diag);
+        st = solve_rounds(&solution, ROUNDS_KNOWN, context, diag);
     if (st == GROOM_OK) {
         fill_points(&solution);
         exchange_guides(&solution);

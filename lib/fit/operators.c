@@ -355,9 +355,11 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequ
     groom_status st = matching_create(fit, fit->options.stages.operators.pairs, FLOOR_LAST, context, &matching, diag);
     if (st != GROOM_OK)
         return st;
-    for (uint32_t k = 0; st == GROOM_OK && !ended && k < n_steps; k++)
-        if ((st = refine(matching, &here, 1, STEPS_AT_HAND, CONVERGED_LAST, &square, &ended, context, diag)) == GROOM_OK)
+    for (uint32_t k = 0, last = 0; st == GROOM_OK && !last && k < n_steps; k++) {
+        last = ended || k + 1 == n_steps;
+        if ((st = refine(matching, &here, (int)last, STEPS_AT_HAND, CONVERGED_LAST, &square, &ended, context, diag)) == GROOM_OK)
             trial_keep(&here, fit);
+    }
     matching_destroy(matching);
     return st;
 }
@@ -506,7 +508,9 @@ static groom_status refine_step(struct groom_fit *fit, struct matching *matching
     double square = 0;
     int converged = 0;
     trial_init(fit, &here);
-    groom_status st = refine(matching, &here, floor_of(fit) <= FLOOR_LAST, 1, CONVERGED, &square, &converged, context, diag);
+    groom_status st = refine(matching, &here, 0, 1, CONVERGED, &square, &converged, context, diag);
+    if (st == GROOM_OK && converged && floor_of(fit) <= FLOOR_LAST) /* at the minimum, as one side has it */
+        st = refine(matching, &here, 1, 1, CONVERGED, &square, &converged, context, diag);
     if (st != GROOM_OK)
         return st;
     trial_keep(&here, fit);

@@ -205,8 +205,10 @@ static groom_status search_curls(struct groom_fit *fit, struct random_search *se
     uint32_t *begin = memory_array(allocator, n_begin, sizeof *begin);
     uint32_t *member = memory_array(allocator, fit->n, sizeof *member);
     groom_status st = begin && member ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to sort strands");
+    uint32_t n_asked = fit->options.stages.randoms.strands;
+    n_asked = n_asked > 1 && (half || pass->wide) ? n_asked / 2 : n_asked; /* of each half; a wide look is a rough one */
     if (st == GROOM_OK) {
-        struct random_search_groups groups = {member, begin, fit->options.stages.randoms.strands, pass->round == 0,
+        struct random_search_groups groups = {member, begin, n_asked, pass->round == 0,
                                               scale_before(fit->groom, pass->op)};
         sort_by_guide(fit->groom, begin, member);
         if (!half && pass->wide && fit->iteration == 0)
