@@ -5,9 +5,7 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "fit/likeness.h"
-#include "groom/strands.h"
 
 struct bundling {
     struct groom_fit *fit;

@@ -30,10 +30,11 @@ enum phase { SOLVE, ASSIGN, ENDED };
 
 #define TOLERANCE 1e-6
 #define MOST_ITERATIONS 300
-#define USUAL_ACROSS 3.0        /* where strands cannot tell */
+#define USUAL_ACROSS 4.0        /* where strands cannot tell */
 #define HELD 5                  /* one strand of so many is foretold */
 #define TOLERANCE_CHOOSING 1e-3
 #define ITERATIONS_CHOOSING 40
+#define FEW_STRANDS 8.0        /* of an operator guide tell little of where it stands */
 #define ROUNDS_AT_HEAD 2
 #define ROUNDS_KNOWN 1          /* of guides that were out of the head already */
 #define HOLD_ROOT_EXPECTED 0.1 /* of an operator guide in the middle of its strands, over the weight of their vertices; */
@@ -144,7 +145,7 @@ static groom_status expect_roots(struct solution *solution, int known, const str
     bundles_places(fit, place);
     for (uint32_t o = 0; o < fit->groom->n_operator_guides; o++) {
         size_t root = (size_t)fit->groom->operator_guide[o] * fit->m;
-        double weight = (known ? HOLD_ROOT_KNOWN : HOLD_ROOT_EXPECTED) * place[o].n * fit->m;
+        double weight = (known ? HOLD_ROOT_KNOWN : HOLD_ROOT_EXPECTED) * (place[o].n + FEW_STRANDS) * fit->m;
         solution->system.hold[root] = weight;
         for (int c = 0; !known && c < 3; c++)
             solution->system.pull[root][c] += weight * (place[o].middle[c] - fit->groom->guides[root][c]) / fit->scale;

@@ -31,6 +31,7 @@ enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 
 #define UNIT 0.1               /* metres on an ordinary head: what the paper's weights were made for */
 #define LOSS_STRANDS 1500      /* compared by the shape losses */
+#define FEWEST_STRANDS 32      /* that statistics are taken of: the estimates of fewer stay */
 #define LEAST_LOGARITHM 1e-3   /* of a parameter's initial value: as good as 0 */
 #define LEAST_START 0.3        /* of a parameter's initial value, to begin with: below, it hardly shows */
 #define LEAST_RANDOM 1.0       /* of one that scales a random number: the effect goes with its square */
@@ -350,7 +351,7 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequ
     double square;
     int ended = 0;
     trial_init_for(fit, frequencies_known, &here);
-    if (here.n_unknowns == 0)
+    if (here.n_unknowns == 0 || fit->n < FEWEST_STRANDS)
         return GROOM_OK;
     groom_status st = matching_create(fit, fit->options.stages.operators.pairs, FLOOR_LAST, context, &matching, diag);
     if (st != GROOM_OK)
@@ -553,7 +554,8 @@ groom_status operators_step(struct groom_fit *fit, int *ended, const struct groo
     switch ((enum phase)fit->phase) {
     case BEFORE:
         if (is_paper(fit) ? paper_operators_iterations(fit) == 0
-                          : count_unknowns(fit) == 0 || fit->options.stages.operators.refinements == 0)
+                          : count_unknowns(fit) == 0 || fit->options.stages.operators.refinements == 0 ||
+                                fit->n < FEWEST_STRANDS)
             fit->phase = ENDED;
         else if ((st = report_losses(fit, 0, context, diag)) == GROOM_OK && is_paper(fit))
             fit->phase = REFINE;

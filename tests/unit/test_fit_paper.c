@@ -106,7 +106,7 @@ START_TEST(the_gradient_of_shapes_is_that_of_their_loss)
     struct groom_fit *fit = before_operators(GROOM_SAMPLE_WAVY, 150, &sample);
     struct gradient_shape *shape;
     ck_ok(gradient_shape_create(fit, NULL, &shape, NULL));
-    agrees(fit, shape_loss, shape, types, 3, 3e-4, 0.02);
+    agrees(fit, shape_loss, shape, types, 3, 1e-4, 0.02);
     gradient_shape_destroy(shape);
     groom_fit_destroy(fit);
     groom_sample_destroy(sample);
@@ -199,7 +199,7 @@ START_TEST(steps_go_down)
     struct groom_sample *sample = guides_sample(GROOM_SAMPLE_CURLY, 200, M, 3, NULL);
     struct groom_fit_options options = paper_options(sample);
     options.stages.guides.iterations = 200;
-    options.stages.operators.iterations = 60;
+    options.stages.operators.iterations = 120; /* Adam's first steps overshoot */
     struct groom_fit *fit = guides_fit(sample, &options, "", NULL);
     const struct groom_fit_loss *weights = fits_loss(fit, "instance_weights", "L_x"), *guides = fits_loss(fit, "guides", "L_g");
     const struct groom_fit_loss *shape = fits_loss(fit, "operators", "shape");
