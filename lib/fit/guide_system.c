@@ -73,9 +73,9 @@ groom_status guide_system_init(struct guide_system *system, const struct mean_st
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     size_t size = (size_t)mean->n_guides * mean->m;
-    *system = (struct guide_system){.n_guides = mean->n_guides, .m = mean->m, .allocator = allocator,
-                                    .along = along * mean->n / mean->n_guides};
+    *system = (struct guide_system){.n_guides = mean->n_guides, .m = mean->m, .allocator = allocator};
     int fine = sparse_init(&system->matrix, mean->n_guides, allocator);
+    system->along = memory_array(allocator, mean->m, sizeof *system->along);
     system->power = memory_array(allocator, mean->m, sizeof *system->power);
     system->hold = memory_array_zero(allocator, size, sizeof *system->hold);
     system->pull = memory_array(allocator, size, sizeof *system->pull);
@@ -86,11 +86,12 @@ groom_status guide_system_init(struct guide_system *system, const struct mean_st
     system->p = memory_array(allocator, size, sizeof *system->p);
     system->q = memory_array(allocator, size, sizeof *system->q);
     system->partial = memory_array(allocator, mean->n_guides, sizeof *system->partial);
-    if (!fine || !system->power || !system->hold || !system->pull || !system->band || !system->arrow || !system->r || !system->z ||
+    if (!fine || !system->along || !system->power || !system->hold || !system->pull || !system->band || !system->arrow || !system->r || !system->z ||
         !system->p || !system->q || !system->partial || !fill_matrix(system, mean, laplacian, across))
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the equations of %u guides", mean->n_guides);
     for (uint32_t j = 0; j < mean->m; j++) {
         double rest = mean->rest[j];
+        system->along[j] = along * mean->n / mean->n_guides;
         system->power[j][0] = rest * rest, system->power[j][1] = rest * (1 - rest), system->power[j][2] = (1 - rest) * (1 - rest);
     }
     mean_strands_pull(mean, system->pull, context);
@@ -104,6 +105,7 @@ void guide_system_finish(struct guide_system *system)
     if (!allocator)
         return;
     sparse_finish(&system->matrix);
+    memory_release(allocator, system->along, system->m, sizeof *system->along);
     memory_release(allocator, system->power, system->m, sizeof *system->power);
     memory_release(allocator, system->hold, size, sizeof *system->hold);
     memory_release(allocator, system->pull, size, sizeof *system->pull);
@@ -161,7 +163,7 @@ static void add_along(const struct guide_system *system, const double (*restrict
             for (uint32_t d = begin; d <= BAND; d++)
                 sum += difference[d] * s[j + d][c];
             for (uint32_t d = begin; d <= BAND; d++)
-                out[j + d][c] += system->along * difference[d] * sum;
+                out[j + d][c] += system->along[j] * difference[d] * sum;
         }
 }
 
@@ -234,7 +236,7 @@ static void fill_block(const struct guide_system *system, uint32_t g, double (*b
         for (uint32_t a = 0; a <= BAND; a++)
             for (uint32_t b = 0; b <= a; b++)
                 if (j + b > 0)
-                    band[j + a - 1][BAND - (a - b)] += system->along * difference[a] * difference[b];
+                    band[j + a - 1][BAND - (a - b)] += system->along[j] * difference[a] * difference[b];
 }
 
 static double at_band(const double (*band)[BAND + 1], uint32_t row, uint32_t column)

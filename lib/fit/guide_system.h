@@ -7,7 +7,7 @@
 #include "fit/sparse.h"
 
 /* Minimise over shapes s (s_g0 = 0) and moves t of operator guides' roots, towards which strands close in,
- *     sum_i |E[x_i] - target_i|^2  +  nu along sum_g,j |s_g,j-1 - 3 s_gj + 3 s_g,j+1 - s_g,j+2|^2
+ *     sum_i |E[x_i] - target_i|^2  +  nu sum_g,j along_j |s_g,j-1 - 3 s_gj + 3 s_g,j+1 - s_g,j+2|^2
  *                                  +  nu across sum_j |(L s_j)|^2  +  sum_gj hold_gj |s_gj - place_gj|^2
  * where nu = n / n_guides, so that the weights mean the same for any number of strands. Where vectors have a row for
  * each vertex, row 0 is t, of guides that are no operator guide 0; `hold` and `place` of row 0 are t's. */
@@ -15,7 +15,7 @@ struct guide_system {
     uint32_t n_guides, m;
     struct sparse matrix;     /* of the data: own shapes, own and clumped, clumped and own, clumped; across */
     double (*power)[3];       /* [m] rest^2, rest clump, clump^2 */
-    double along;             /* times nu */
+    double *along;            /* [m] of the third difference that begins at j, nu included */
     double *hold;             /* [n_guides * m] */
     double (*pull)[3];        /* [n_guides * m] right-hand side, `hold` included */
     double (*band)[4];        /* [n_guides * (m - 1)] Cholesky factor of each guide's own block: (j, j-3..j) */
@@ -26,6 +26,7 @@ struct guide_system {
 };
 
 /* laplacian  [n_guides] rows; entry 0 counts
+ * along      of all vertices, to begin with
  * returns    GROOM_OK, GROOM_ENOMEM; finish it in any case */
 GROOM_MUST_CHECK groom_status guide_system_init(struct guide_system *system, const struct mean_strands *mean,
                                                 const struct sparse *laplacian, double along, double across,

@@ -34,6 +34,8 @@ enum phase { SOLVE, ASSIGN, ENDED };
 #define HELD 5                  /* one strand of so many is foretold */
 #define TOLERANCE_CHOOSING 1e-3
 #define ITERATIONS_CHOOSING 40
+#define ROOT_PART 6            /* of so many of a guide, where it turns out of the scalp */
+#define LOOSEST 0.001          /* of the usual weight along it, there */
 #define FEW_STRANDS 8.0        /* of an operator guide tell little of where it stands */
 #define ROUNDS_AT_HEAD 2
 #define ROUNDS_KNOWN 1          /* of guides that were out of the head already */
@@ -260,6 +262,37 @@ static uint32_t hold_out_of_head(struct solution *solution, const struct groom_c
 /* The weight of third differences at which waves of `cycles` a guide keep half of their size. */
 static double along_of(double cycles, uint32_t m) { return pow(2 * sin(M_PI * fmin(cycles / (m - 1), 0.5)), -6); }
 
+/* How large third differences from vertex j on are, over all guides as they stand. */
+static double roughness_at(const struct solution *solution, uint32_t j)
+{
+    double sum = 0;
+    for (uint32_t g = 0; g < solution->fit->n_guides; g++) {
+        const double (*s)[3] = (const double (*)[3])(solution->shape + (size_t)g * solution->fit->m + j);
+        for (int c = 0; c < 3; c++)
+            sum += pow(s[3][c] - 3 * s[2][c] + 3 * s[1][c] - s[0][c], 2);
+    }
+    return sum;
+}
+
+/* Hair that is combed turns sharply out of the scalp and hardly at all farther on, which one weight for all of a guide
+ * smooths away near the root. So third differences weigh there by how large they usually are, as if each were drawn from
+ * a normal distribution of its place. Beyond the root's part all weigh the same: from there on, what is rough may as well
+ * be what operators have left in the guides. */
+static void loosen_roots(struct solution *solution)
+{
+    uint32_t m = solution->fit->m, part = m / ROOT_PART, last = m - 3;
+    double usual = 0;
+    if (m <= 2 * ROOT_PART)
+        return;
+    for (uint32_t j = part; j < last; j++)
+        usual += roughness_at(solution, j) / (last - part);
+    for (uint32_t j = 0; j < part; j++) {
+        double here = roughness_at(solution, j);
+        if (here > usual)
+            solution->system.along[j] *= fmax(usual / here, LOOSEST);
+    }
+}
+
 static groom_status cancelled(struct groom_diag *diag)
 {
     return groom_fail(diag, GROOM_ECANCELLED, "cancelled while guides were solved for");
@@ -369,6 +402,8 @@ static groom_status solution_init(struct solution *solution, struct groom_fit *f
         return st;
     st = guide_system_init(&solution->system, &solution->mean, &solution->laplacian, along_of(cycles, fit->m), across,
                            context, diag);
+    if (st == GROOM_OK && known)
+        loosen_roots(solution);
     int clumps = solution->mean.n_parts > fit->groom->n_instancing;
     if (st == GROOM_OK && clumps)
         st = expect_roots(solution, known, context, diag);
