@@ -1,7 +1,6 @@
 #include "fit/calibrate.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "base/memory.h"
 #include "fit/gather.h"
@@ -35,6 +34,8 @@ static groom_status sample_init(struct sample *sample, struct groom_fit *fit, co
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     *sample = (struct sample){.fit = fit, .n = fit->n < STRANDS ? fit->n : STRANDS};
+    for (uint32_t o = 0; o < fit->groom->n_operators; o++)
+        sample->amplitude[o] = fit->groom->operators[o].parameter[AMPLITUDE];
     size_t n_points = (size_t)sample->n * fit->m;
     sample->strand = memory_array(allocator, fit->n, sizeof *sample->strand);
     sample->fitted = memory_array(allocator, n_points, sizeof *sample->fitted);
@@ -42,8 +43,6 @@ static groom_status sample_init(struct sample *sample, struct groom_fit *fit, co
     if (!sample->strand || !sample->fitted || !sample->target)
         return groom_fail(diag, GROOM_ENOMEM, "no memory to compare the curvature of %u strands", sample->n);
     groom_fair_order(fit->n, sample->strand);
-    for (uint32_t o = 0; o < fit->groom->n_operators; o++)
-        sample->amplitude[o] = fit->groom->operators[o].parameter[AMPLITUDE];
     return GROOM_OK;
 }
 
@@ -116,8 +115,7 @@ groom_status calibrate_frizz(struct groom_fit *fit, const struct groom_context *
     groom_status st = sample_init(&sample, fit, context, diag);
     if (st == GROOM_OK)
         st = find_factor(&sample, &factor, context, diag);
-    if (sample.strand && sample.target)
-        set_factor(&sample, st == GROOM_OK ? factor : 0);
+    set_factor(&sample, st == GROOM_OK ? factor : 0);
     sample_finish(&sample, context);
     return st;
 }

@@ -44,6 +44,25 @@ static float *amplitude_of(struct groom *groom)
     return NULL;
 }
 
+/* Whatever allocation fails, the parameter stays. */
+static void without_memory(struct groom_fit *fit, const float *amplitude)
+{
+    float before = *amplitude;
+    groom_status st = GROOM_ENOMEM;
+    for (uint64_t fail_at = 1; st != GROOM_OK; fail_at++) {
+        struct test_failing_allocator state;
+        struct groom_allocator allocator;
+        test_failing_allocator_init(&state, fail_at, &allocator);
+        struct groom_context context = {.allocator = &allocator};
+        st = calibrate_frizz(fit, &context, NULL);
+        ck_assert(st == GROOM_OK || st == GROOM_ENOMEM);
+        if (st != GROOM_OK)
+            ck_assert_float_eq(*amplitude, before);
+        ck_assert_uint_eq(state.outstanding_bytes, 0);
+        ck_assert_uint_lt(fail_at, 2000);
+    }
+}
+
 /* A fit has ended with its frizz calibrated: from 1 % off it comes back, from 30 % off as far as is let. */
 START_TEST(an_amplitude_that_is_off_comes_back)
 {
@@ -73,6 +92,8 @@ START_TEST(an_amplitude_that_is_off_comes_back)
     *amplitude = 0.7f * right;
     ck_ok(calibrate_frizz(fit, NULL, NULL));
     ck_assert_float_eq_tol(*amplitude, 0.7f * expf(0.015f) * right, 1e-3f * right);
+    *amplitude = right;
+    without_memory(fit, amplitude);
     groom_fit_destroy(fit);
     groom_sample_destroy(sample);
     free(fit_options);
