@@ -8,7 +8,7 @@
 
 /* --- life ------------------------------------------------------------------------------- */
 
-static size_t memory_lanes(uint32_t m) { return (size_t)(4 + 4 + 4 + 3 * RANDOM_BLOCK_WEIGHTS) * m + STRAND_ERROR_SCRATCH(m); }
+static size_t memory_lanes(uint32_t m) { return (size_t)(3 + 4 + 4 + 3 * RANDOM_BLOCK_WEIGHTS) * m + STRAND_ERROR_SCRATCH(m); }
 
 groom_status random_block_memory_init(struct random_search_memory *memory, uint32_t m, uint32_t n_active,
                                       const struct groom_allocator *allocator)
@@ -19,8 +19,7 @@ groom_status random_block_memory_init(struct random_search_memory *memory, uint3
     if (!(memory->memory = memory_array(allocator, memory_lanes(m), sizeof *memory->memory)))
         return GROOM_ENOMEM;
     memory->target.point = memory->memory;
-    memory->target.inverse_chord = memory->target.point + (size_t)3 * m;
-    memory->plane = memory->target.inverse_chord + m;
+    memory->plane = memory->target.point + (size_t)3 * m;
     memory->scratch = memory->plane + (size_t)4 * m;
     memory->blend = memory->scratch + STRAND_ERROR_SCRATCH(m);
     memory->toward = memory->blend + (size_t)4 * m;

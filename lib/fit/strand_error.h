@@ -4,7 +4,7 @@
  * so that two polylines along one curve agree however their vertices are spread:
  *     direction (1 - mean of <d, d^>) + vertex mean |x - x^|^2 + length (l - l^)^2
  *         + depth mean of depth in the head^2
- * at equal fractions of arc length; d, x: the strand, d^, x^: its target. */
+ * at equal fractions of arc length; d, x: the strand, d^, x^: its target. Continuous in both. */
 #ifndef FIT_STRAND_ERROR_H
 #define FIT_STRAND_ERROR_H
 
@@ -15,12 +15,11 @@ struct strand_error_weights { float direction, vertex, length, depth; }; /* 1, 1
 /* Targets of a block's strands, relative to their roots, metres. */
 struct strand_error_target {
     lanes *point;         /* [3m] */
-    lanes *inverse_chord; /* [m-1] 1 / length of a segment, or 0 */
     lanes length;         /* of the polyline */
     lanes *plane;         /* [4 * head_planes_of(m)] normals and offsets (head_planes.h), or NULL: there is no head */
 };
 
-/* Fills inverse_chord and length. */
+/* Fills length. */
 void strand_error_measure(uint32_t m, struct strand_error_target *target);
 
 #define STRAND_ERROR_SCRATCH(m) ((size_t)2 * (m))

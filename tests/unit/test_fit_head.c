@@ -50,8 +50,8 @@ END_TEST
 /* Straight down from the root, the surface 50 mm below it: the mean square of what is deeper. */
 START_TEST(depth_costs_its_mean_square)
 {
-    static lanes x[3 * M], target_x[3 * M], inverse[M], plane[4 * M], scratch[STRAND_ERROR_SCRATCH(M)];
-    struct strand_error_target target = {.point = target_x, .inverse_chord = inverse, .plane = plane};
+    static lanes x[3 * M], target_x[3 * M], plane[4 * M], scratch[STRAND_ERROR_SCRATCH(M)];
+    struct strand_error_target target = {.point = target_x, .plane = plane};
     struct strand_error_weights weights = {.depth = 4};
     lanes error;
     double expected = 0;
