@@ -140,10 +140,11 @@ static float rate_at(const struct curl_grid *grid, uint32_t i)
 }
 
 /* Phases are turned back into the range by whole turns. */
+static float phase_in_range(float u) { return u < 0 ? u + PERIOD : u > 1 ? u - PERIOD : u; }
+
 static float phase_at(const struct curl_grid *grid, uint32_t k)
 {
-    float u = grid->phase_first + (float)k * grid->phase_step;
-    return u < 0 ? u + PERIOD : u > 1 ? u - PERIOD : u;
+    return phase_in_range(grid->phase_first + (float)k * grid->phase_step);
 }
 
 /* Scales strands to the lengths of their targets: lengths are all but linear in the number. */
@@ -204,6 +205,24 @@ static struct block asked_block(const struct curls_job *job, uint32_t guide, uin
     return block_of(strand, n_here);
 }
 
+/* Where the paraboloid through the best value of a grid and the eight around it is least. Between two values that are as
+ * good rounding would choose, and a phase would be 7 degrees off. */
+static void settle(const struct curl_grid *grid, const double *cost, uint32_t best, float u[2])
+{
+    uint32_t row = grid->n_phases, i = best / row, k = best % row;
+    if (i == 0 || i + 1 >= grid->n_rates || k == 0 || k + 1 >= row)
+        return;
+    const double *c = cost + best, *less = c - row, *more = c + row;
+    double rate = 0.5 * (more[0] - less[0]), phase = 0.5 * (c[1] - c[-1]);
+    double rates = more[0] - 2 * c[0] + less[0], phases = c[1] - 2 * c[0] + c[-1];
+    double both = 0.25 * ((more[1] - more[-1]) - (less[1] - less[-1])), determinant = rates * phases - both * both;
+    if (!(rates > 0 && determinant > 0))
+        return;
+    double along_rate = (both * phase - phases * rate) / determinant, along_phase = (both * rate - rates * phase) / determinant;
+    u[0] = fminf(fmaxf(u[0] + grid->rate_step * (float)fmin(fmax(along_rate, -1), 1), -1), 1);
+    u[1] = phase_in_range(u[1] + grid->phase_step * (float)fmin(fmax(along_phase, -1), 1));
+}
+
 /* The best of a grid for all strands of an operator guide that are asked. */
 static void search_grid(const struct curls_job *job, struct random_search_memory *memory, uint32_t guide,
                         const struct curl_grid *grid, float u[2])
@@ -219,6 +238,7 @@ static void search_grid(const struct curls_job *job, struct random_search_memory
             best = at;
     u[0] = rate_at(grid, best / grid->n_phases);
     u[1] = phase_at(grid, best % grid->n_phases);
+    settle(grid, (const double *)cost, best, u);
 }
 
 static struct curl_grid grid_around(const float u[2], float rate_step, float phase_step)
@@ -275,6 +295,15 @@ static void add_trades(const struct curls_job *job, struct random_search_memory 
     }
 }
 
+/* Where the parabola through the best of these costs and those beside it is least, in steps from there. */
+static float vertex_of(const double cost[TRADES], uint32_t best)
+{
+    if (best == 0 || best + 1 == TRADES)
+        return 0;
+    double slope = 0.5 * (cost[best + 1] - cost[best - 1]), bend = cost[best + 1] - 2 * cost[best] + cost[best - 1];
+    return bend > 0 ? (float)fmin(fmax(-slope / bend, -1), 1) : 0;
+}
+
 /* Another frequency for a guide, and scales of all its strands with it. */
 static void trade(const struct curls_job *job, struct random_search_memory *memory, uint32_t guide)
 {
@@ -293,7 +322,7 @@ static void trade(const struct curls_job *job, struct random_search_memory *memo
         }
         for (uint32_t t = 0; t < TRADES; t++)
             best = cost[t] < cost[best] ? t : best;
-        chosen = rate[best];
+        chosen = fminf(fmaxf(rate[best] + step * vertex_of((const double *)cost, best), -1), 1);
     }
     for (uint32_t at = job->groups->begin[guide]; at < job->groups->begin[guide + 1]; at++) {
         float *u = &scale->random[0][job->groups->member[at]];
