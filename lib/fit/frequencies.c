@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "fit/spread.h"
 #include "groom/strands.h"
 
 enum { FREQUENCY = 1, RANDOM_FREQUENCY }; /* of a curl's parameters */
@@ -78,39 +79,6 @@ static void count_strands(const struct groom *groom, uint32_t *count)
         count[groom->operator_guide_of[i]]++;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* Of the numbers that are found, from how far those of two halves are apart: that of their mean is a quarter of the
- * square. By the median, as a half may be another curl's. */
-static double error_variance(const struct groom *groom, const float (*half)[2], double *square)
-{
-    uint32_t n = 0;
-    for (uint32_t o = 0; o < groom->n_operator_guides; o++)
-        if (isfinite(half[o][0]) && isfinite(half[o][1]))
-            square[n++] = 0.25 * pow((double)half[o][0] - (double)half[o][1], 2);
-    qsort(square, n, sizeof *square, compare_doubles);
-    return n > 0 ? square[n / 2] / USUAL_SQUARE : 0;
-}
-
-/* Mean and variance of the numbers, each curl as often as it has strands. */
-static void spread_of(const struct groom *groom, const struct groom_operator *curl, const uint32_t *count, double *mean,
-                      double *variance)
-{
-    double weight = 0, sum = 0, square = 0;
-    for (uint32_t o = 0; o < groom->n_operator_guides; o++) {
-        double w = count[o] < LEAST_STRANDS ? 0 : count[o], u = curl->random[0][o];
-        weight += w;
-        sum += w * u;
-        square += w * u * u;
-    }
-    *mean = weight > 0 ? sum / weight : 0;
-    *variance = weight > 0 ? fmax(square / weight - *mean * *mean, 0) : 0;
-}
-
 struct counted { double number, strands; };
 
 static int compare_counted(const void *a, const void *b)
@@ -121,10 +89,11 @@ static int compare_counted(const void *a, const void *b)
     return (x->strands > y->strands) - (x->strands < y->strands);
 }
 
-/* The number below which a share of the strands are. */
-static double quantile(const struct counted *counted, uint32_t n, double share)
+/* The number below which a share of the strands are. Sorts. */
+static double quantile(struct counted *counted, uint32_t n, double share)
 {
     double all = 0, below = 0;
+    qsort(counted, n, sizeof *counted, compare_counted);
     for (uint32_t k = 0; k < n; k++)
         all += counted[k].strands;
     for (uint32_t k = 0; k < n; k++)
@@ -133,18 +102,78 @@ static double quantile(const struct counted *counted, uint32_t n, double share)
     return 0;
 }
 
-/* The same as spread_of, of the law that the middle of the numbers is of. */
-static void middle_of(const struct groom *groom, const struct groom_operator *curl, const uint32_t *count,
-                      struct counted *counted, double *mean, double *variance)
+/* A frequency is as uncertain as its curl is short: what is off is the turns over it. */
+static double error_size(const struct groom *groom, uint32_t guide, double usual)
+{
+    return usual / fmax(length_of(groom, guide), 1e-3 * usual);
+}
+
+/* Of the numbers that are found, at the usual length, from how far those of two halves are apart: that of their mean is
+ * a quarter of the square. By the median, as a half may be another curl's. */
+static double error_variance(const struct groom *groom, const float (*half)[2], double usual, struct counted *counted)
+{
+    uint32_t n = 0;
+    for (uint32_t o = 0; o < groom->n_operator_guides; o++)
+        if (isfinite(half[o][0]) && isfinite(half[o][1])) {
+            double off = 0.5 * ((double)half[o][0] - (double)half[o][1]) / error_size(groom, o, usual);
+            counted[n++] = (struct counted){off * off, 1};
+        }
+    return n > 0 ? quantile(counted, n, 0.5) / USUAL_SQUARE : 0;
+}
+
+/* The law that the middle of the numbers is of. */
+static struct spread_law middle_of(const struct groom *groom, const struct groom_operator *curl, const uint32_t *count,
+                                   struct counted *counted)
 {
     uint32_t n = 0;
     for (uint32_t o = 0; o < groom->n_operator_guides; o++)
         if (count[o] >= LEAST_STRANDS)
             counted[n++] = (struct counted){curl->random[0][o], count[o]};
-    qsort(counted, n, sizeof *counted, compare_counted);
     double low = quantile(counted, n, MIDDLE_FROM), high = quantile(counted, n, 1 - MIDDLE_FROM);
-    *mean = 0.5 * (low + high);
-    *variance = pow(ROUGHLY_WIDER * TRUNCATED_DEVIATION * (high - low) / MIDDLE_WIDTH, 2);
+    double deviation = ROUGHLY_WIDER * TRUNCATED_DEVIATION * (high - low) / MIDDLE_WIDTH;
+    return (struct spread_law){0.5 * (low + high), deviation * deviation, 0};
+}
+
+/* The numbers as samples of the law, each curl as often as it has strands. sample [n_gop]; returns how many count */
+static uint32_t list_samples(const struct groom *groom, const struct groom_operator *curl, const uint32_t *count,
+                             double usual, struct spread_sample *sample)
+{
+    uint32_t n = 0;
+    for (uint32_t o = 0; o < groom->n_operator_guides; o++)
+        if (count[o] >= LEAST_STRANDS)
+            sample[n++] = (struct spread_sample){curl->random[0][o], count[o], error_size(groom, o, usual)};
+    return n;
+}
+
+/* Not all differences of the numbers are explained away. */
+static struct spread_law likeliest(const struct groom *groom, const struct groom_operator *curl, const uint32_t *count,
+                                   const float (*half)[2], double usual, struct counted *counted,
+                                   struct spread_sample *sample)
+{
+    uint32_t n = list_samples(groom, curl, count, usual, sample);
+    struct spread_law law, plain;
+    spread_find(sample, n, error_variance(groom, half, usual, counted), &law);
+    for (uint32_t i = 0; i < n; i++)
+        sample[i].size = 0;
+    spread_find(sample, n, 0, &plain);
+    law.variance = fmax(law.variance, (1 - MOST_ERROR) * plain.variance);
+    return law;
+}
+
+/* The law is the operator's from now on, and each curl has the frequency that it is expected to have by it: those of
+ * long guides as they were found, those of short ones nearer to the mean. */
+static void apply_law(struct groom *groom, struct groom_operator *curl, const struct spread_law *law, double usual)
+{
+    double frequency = curl->parameter[FREQUENCY], random = curl->parameter[RANDOM_FREQUENCY];
+    double centre = fmax(frequency + random * law->mean, 0);
+    double spread = fmax(random * sqrt(law->variance) / TRUNCATED_DEVIATION, LEAST_SPREAD * centre);
+    curl->parameter[FREQUENCY] = (float)centre;
+    curl->parameter[RANDOM_FREQUENCY] = (float)spread;
+    for (uint32_t o = 0; o < groom->n_operator_guides; o++) {
+        struct spread_sample sample = {curl->random[0][o], 1, error_size(groom, o, usual)};
+        double number = spread > 0 ? random * (spread_expect(law, &sample) - law->mean) / spread : 0;
+        set_number(groom, curl, o, frequency + random * sample.value, number);
+    }
 }
 
 groom_status frequencies_restate(struct groom *groom, struct groom_operator *curl, const float (*half)[2],
@@ -152,28 +181,18 @@ groom_status frequencies_restate(struct groom *groom, struct groom_operator *cur
 {
     uint32_t n = groom->n_operator_guides;
     uint32_t *count = memory_array_zero(allocator, n, sizeof *count);
-    double *square = memory_array(allocator, n, sizeof *square), mean, variance;
     struct counted *counted = memory_array(allocator, n, sizeof *counted);
-    groom_status st = count && square && counted ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for the frequencies of curls");
+    struct spread_sample *sample = memory_array(allocator, n, sizeof *sample);
+    groom_status st = count && counted && sample ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for the frequencies of curls");
     if (st == GROOM_OK) {
-        double frequency = curl->parameter[FREQUENCY], random = curl->parameter[RANDOM_FREQUENCY];
+        double usual = mean_length(groom);
         count_strands(groom, count);
-        if (half)
-            spread_of(groom, curl, count, &mean, &variance);
-        else
-            middle_of(groom, curl, count, counted, &mean, &variance);
-        double error = half ? fmin(error_variance(groom, half, square), MOST_ERROR * variance) : 0;
-        double centre = fmax(frequency + random * mean, 0), found = sqrt(variance) / TRUNCATED_DEVIATION;
-        double law = random * sqrt(variance - error) / TRUNCATED_DEVIATION;
-        curl->parameter[FREQUENCY] = (float)centre;
-        curl->parameter[RANDOM_FREQUENCY] = (float)fmax(law, LEAST_SPREAD * centre);
-        for (uint32_t o = 0; o < n; o++) {
-            double u = curl->random[0][o];
-            set_number(groom, curl, o, frequency + random * u, found > 0 ? (u - mean) / found : 0);
-        }
+        struct spread_law law = half ? likeliest(groom, curl, count, half, usual, counted, sample)
+                                     : middle_of(groom, curl, count, counted);
+        apply_law(groom, curl, &law, usual);
     }
     memory_release(allocator, count, n, sizeof *count);
-    memory_release(allocator, square, n, sizeof *square);
     memory_release(allocator, counted, n, sizeof *counted);
+    memory_release(allocator, sample, n, sizeof *sample);
     return st;
 }

@@ -1,4 +1,4 @@
-/* K-means, K-medoids, smoothing, regions: each against brute force or what is known of it. */
+/* K-means, K-medoids, smoothing, regions, spreads: each against brute force or what is known of it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,6 +7,7 @@
 #include "fit/regions.h"
 #include "fit/simplex.h"
 #include "fit/smooth.h"
+#include "fit/spread.h"
 #include "geometry/kmeans.h"
 #include "groom/random.h"
 #include "tests/support/test.h"
@@ -533,6 +534,66 @@ START_TEST(regions_survive_each_failing_allocation)
 }
 END_TEST
 
+/* --- spreads ------------------------------------------------------------------------------- */
+
+#define MEASURED 400
+
+/* Things around 5, 2 apart, measured with errors of 1 times 0.5 to 3.5. */
+static void measure(struct spread_sample sample[MEASURED], double *thing)
+{
+    for (uint32_t i = 0; i < MEASURED; i++) {
+        double size = 0.5 + (double)(i % 4);
+        thing[i] = 5 + 2 * groom_random_normal(key, i, 1);
+        sample[i] = (struct spread_sample){thing[i] + size * groom_random_normal(key, i, 2), 1, size};
+    }
+}
+
+START_TEST(a_law_is_told_from_the_errors_of_its_samples)
+{
+    static struct spread_sample sample[MEASURED];
+    static double thing[MEASURED];
+    struct spread_law law;
+    double off = 0, measured = 0;
+    measure(sample, thing);
+    spread_find(sample, MEASURED, 3, &law); /* and what is known otherwise is wrong */
+    ck_assert_double_eq_tol(law.mean, 5, 0.3);
+    ck_assert_double_eq_tol(sqrt(law.variance), 2, 0.25);
+    ck_assert_double_eq_tol(sqrt(law.error), 1, 0.15);
+    for (uint32_t i = 0; i < MEASURED; i++) {
+        off += pow(spread_expect(&law, &sample[i]) - thing[i], 2);
+        measured += pow(sample[i].value - thing[i], 2);
+    }
+    ck_assert_double_lt(off, 0.5 * measured);
+}
+END_TEST
+
+START_TEST(samples_without_errors_are_the_law)
+{
+    static struct spread_sample sample[MEASURED];
+    static double thing[MEASURED];
+    struct spread_law law;
+    measure(sample, thing);
+    for (uint32_t i = 0; i < MEASURED; i++)
+        sample[i] = (struct spread_sample){thing[i], 1 + (double)(i % 3), 0};
+    spread_find(sample, MEASURED, 0, &law);
+    ck_assert_double_eq_tol(sqrt(law.variance), 2, 0.2);
+    ck_assert_double_eq_tol(spread_expect(&law, &sample[7]), thing[7], 1e-12);
+}
+END_TEST
+
+START_TEST(a_law_of_nothing_is_none)
+{
+    struct spread_sample same[2] = {{3, 1, 1}, {3, 1, 2}};
+    struct spread_law law;
+    spread_find(NULL, 0, 0, &law);
+    ck_assert_double_eq(law.mean + law.variance, 0);
+    spread_find(same, 2, 0, &law);
+    ck_assert_double_eq(law.mean, 3);
+    ck_assert_double_eq(law.variance, 0);
+    ck_assert_double_eq(spread_expect(&law, &same[1]), 3);
+}
+END_TEST
+
 TEST_SUITE("fit_parts", seeds_are_different_rows_and_cover_separate_blobs, seeding_stops_where_no_place_is_left,
            an_iteration_is_nearest_centre_then_mean,
            the_objective_never_increases_and_no_cluster_is_empty,
@@ -544,4 +605,5 @@ TEST_SUITE("fit_parts", seeds_are_different_rows_and_cover_separate_blobs, seedi
            simplex_weights_are_the_minimum_on_a_fine_grid, no_exchange_between_simplex_weights_is_an_improvement,
            a_limited_support_is_kept_and_better_than_one, columns_that_are_alike_are_survived,
            regions_end_where_neighbours_are_unlike, islands_beyond_the_number_of_regions_are_joined,
-           regions_survive_each_failing_allocation)
+           regions_survive_each_failing_allocation, a_law_is_told_from_the_errors_of_its_samples,
+           samples_without_errors_are_the_law, a_law_of_nothing_is_none)
