@@ -34,6 +34,7 @@ enum phase { SOLVE, ASSIGN, ENDED };
 #define HELD 5                  /* one strand of so many is foretold */
 #define TOLERANCE_CHOOSING 1e-3
 #define ITERATIONS_CHOOSING 40
+#define CURLS_UNKNOWN (2.0 / 3) /* of the waves along a guide, while it could take those of curls for its own */
 #define ROOT_PART 6            /* of so many of a guide, where it turns out of the scalp */
 #define LOOSEST 0.001          /* of the usual weight along it, there */
 #define FEW_STRANDS 8.0        /* of an operator guide tell little of where it stands */
@@ -262,6 +263,20 @@ static uint32_t hold_out_of_head(struct solution *solution, const struct groom_c
 /* The weight of third differences at which waves of `cycles` a guide keep half of their size. */
 static double along_of(double cycles, uint32_t m) { return pow(2 * sin(M_PI * fmin(cycles / (m - 1), 0.5)), -6); }
 
+/* A guide holds all that its strands have in common, and that of a wave of a curl is what the curl is missed by: slow
+ * curls would be found shorter than they are, and other ones. So guides begin smoother where there are curls, and are
+ * what they can be where numbers are known. */
+static double cycles_of(const struct groom_fit *fit, int known)
+{
+    double cycles = fit->options.stages.guides.cycles;
+    int curls = 0;
+    for (uint32_t o = 0; o < fit->groom->n_operators; o++) {
+        const struct groom_operator *op = &fit->groom->operators[o];
+        curls |= op->enabled && op->type == GROOM_OPERATOR_CURL && op->parameter[0] != 0;
+    }
+    return curls && !known ? CURLS_UNKNOWN * cycles : cycles;
+}
+
 /* How large third differences from vertex j on are, over all guides as they stand. */
 static double roughness_at(const struct solution *solution, uint32_t j)
 {
@@ -374,7 +389,7 @@ static groom_status solution_init(struct solution *solution, struct groom_fit *f
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     size_t size = (size_t)fit->n_guides * fit->m;
-    double cycles = fit->options.stages.guides.cycles;
+    double cycles = cycles_of(fit, known);
     groom_status st;
     *solution = (struct solution){.fit = fit};
     solution->shape = memory_array(allocator, size, sizeof *solution->shape);

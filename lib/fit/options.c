@@ -66,7 +66,7 @@ const struct option_row options_table[] = {
     ROW(guides, method, OPTION_METHOD, 0, 0, 0, 0, 1,
         "direct: a linear system, smooth along guides and across the scalp. paper: filtered gradient steps on curvatures (Eqs. 7 to 10)."),
     ROW(guides, cycles, OPTION_REAL, 3, 3, 3, 0.01, 1e3,
-        "Waves along a guide that keep half of their size: shorter ones are left to the operators."),
+        "Waves along a guide that keep half of their size: shorter ones are left to the operators. Two thirds of them as long as curls are not known."),
     ROW(guides, across, OPTION_REAL_OR_AUTO, 3, 0, 0, 1e-6, 1e6,
         "Pull of each guide towards its neighbours on the scalp, over that of its own strands. auto: what foretells strands best that were left out; 3 where operators move strands together."),
     ROW(guides, sigma_d, OPTION_REAL, 0.3, 0.3, 0.3, 1e-6, 1e3,

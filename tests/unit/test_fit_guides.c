@@ -338,6 +338,44 @@ START_TEST(the_stage_reports_its_loss_and_leaves_other_roots)
 }
 END_TEST
 
+/* Sum of squared third differences of all guides. */
+static double roughness(const struct groom *groom)
+{
+    double sum = 0;
+    for (uint32_t g = 0; g < groom->n_guides; g++)
+        for (uint32_t j = 0; j + 3 < groom->n_vertices; j++) {
+            const float (*x)[3] = (const float (*)[3])(groom->guides + (size_t)g * groom->n_vertices + j);
+            for (int c = 0; c < 3; c++)
+                sum += pow((double)x[3][c] - 3 * (double)x[2][c] + 3 * (double)x[1][c] - (double)x[0][c], 2);
+        }
+    return sum;
+}
+
+/* Of one capture, after the stage; with the curl that was estimated, or as if there were none. */
+static double roughness_with_curls(const struct groom_sample *sample, int curls)
+{
+    struct groom_fit_options options;
+    groom_fit_options_init(GROOM_FIT_STANDARD, &options);
+    options.guides = sample->truth->n_guides;
+    options.operator_guides = sample->truth->n_operator_guides;
+    struct groom_fit *fit = guides_fit(sample, &options, "guides", NULL);
+    for (uint32_t o = 0; !curls && o < fit->groom->n_operators; o++)
+        if (fit->groom->operators[o].type == GROOM_OPERATOR_CURL)
+            fit->groom->operators[o].parameter[0] = 0;
+    guides_fit_on(fit, "operators", NULL);
+    double rough = roughness(fit->groom);
+    groom_fit_destroy(fit);
+    return rough;
+}
+
+START_TEST(guides_leave_the_waves_of_curls_to_these)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_WAVY, 1000, VERTICES, 1, NULL);
+    ck_assert_double_lt(roughness_with_curls(sample, 1), 0.7 * roughness_with_curls(sample, 0));
+    groom_sample_destroy(sample);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("fit_guides");
@@ -353,6 +391,7 @@ int main(void)
     tcase_add_test(parts, operator_guides_of_bundles_stand_in_their_middle);
     tcase_add_test(parts, operator_guides_are_found_where_strands_close_in);
     tcase_add_test(parts, the_stage_reports_its_loss_and_leaves_other_roots);
+    tcase_add_test(parts, guides_leave_the_waves_of_curls_to_these);
     suite_add_tcase(suite, parts);
     SRunner *runner = srunner_create(suite);
     srunner_run_all(runner, CK_NORMAL);
