@@ -439,6 +439,28 @@ static groom_status report_losses(struct groom_fit *fit, uint64_t iteration, con
     return GROOM_OK;
 }
 
+/* Numbers of the fit's own seed or of the operators'. */
+static void draw(struct groom *groom, int own)
+{
+    for (uint32_t o = 0; o < groom->n_operators; o++) {
+        struct groom_operator *op = &groom->operators[o];
+        uint64_t seed = op->seed;
+        groom_draw_random(groom, op, own ? FIT_OWN_SEED : seed);
+        op->seed = seed;
+    }
+}
+
+/* All numbers are looked for, and what is found is no lottery: they begin as those of the fit's own seed. The operators'
+ * goes on deciding what a groom draws for other strands, and what is drawn anew. */
+static groom_status begin(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    draw(fit->groom, 1);
+    groom_status st = report_losses(fit, 0, context, diag);
+    if (st != GROOM_OK)
+        draw(fit->groom, 0);
+    return st;
+}
+
 /* --- the stage ---------------------------------------------------------------------------------------------- */
 
 static int is_paper(const struct groom_fit *fit) { return fit->options.stages.randoms.method == GROOM_FIT_PAPER; }
@@ -474,7 +496,7 @@ groom_status randoms_step(struct groom_fit *fit, int *ended, const struct groom_
         return paper_step(fit, ended, context, diag);
     if (fit->phase == 0) {
         if (n > 0)
-            st = report_losses(fit, 0, context, diag);
+            st = begin(fit, context, diag);
         fit->phase += st == GROOM_OK;
     } else if (fit->iteration < size_of(fit, &passes[fit->phase - 1])) {
         st = pass_step(fit, &passes[fit->phase - 1], context, diag);

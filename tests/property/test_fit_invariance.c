@@ -77,12 +77,13 @@ END_TEST
 
 /* --- whole fits -------------------------------------------------------------------------------- */
 
-static struct groom *fitted(groom_sample_style style, struct groom_frame frame)
+static struct groom *fitted_with(groom_sample_style style, struct groom_frame frame, uint64_t seed)
 {
     struct groom_sample *sample = guides_sample(style, N, M, 3, NULL);
     struct groom_fit_options options = known_options(sample, 0);
     struct groom *groom;
     options.vertices = M;
+    options.seed = seed;
     invariance_upload(sample, frame);
     struct groom_fit *fit = guides_fit(sample, &options, "", NULL);
     ck_ok(groom_fit_result(fit, NULL, &groom, NULL));
@@ -90,6 +91,8 @@ static struct groom *fitted(groom_sample_style style, struct groom_frame frame)
     groom_sample_destroy(sample);
     return groom;
 }
+
+static struct groom *fitted(groom_sample_style style, struct groom_frame frame) { return fitted_with(style, frame, 77); }
 
 static void same_parameters(const struct groom *groom, struct groom *other, double most_percent)
 {
@@ -119,6 +122,17 @@ START_TEST(an_upload_that_tells_its_unit_fits_to_the_same_parameters)
 }
 END_TEST
 
+/* A seed decides what is drawn, not what is found. */
+START_TEST(another_seed_fits_to_the_same_parameters)
+{
+    struct groom *groom = fitted(GROOM_SAMPLE_WAVY, METRES), *other = fitted_with(GROOM_SAMPLE_WAVY, METRES, 78);
+    ck_assert_uint_eq(other->operators[0].seed, 78);
+    ck_assert_mem_eq(groom->operators[0].random[0], other->operators[0].random[0], N * sizeof(float));
+    same_parameters(groom, other, 0);
+    groom_destroy(groom);
+}
+END_TEST
+
 TEST_SUITE("fit_invariance", rounding_in_another_unit_changes_nothing, another_axis_up_changes_nothing,
            turned_hair_has_the_same_parameters, the_seed_moves_no_parameter, an_upload_that_tells_its_axis_moves_no_parameter,
-           an_upload_that_tells_its_unit_fits_to_the_same_parameters)
+           an_upload_that_tells_its_unit_fits_to_the_same_parameters, another_seed_fits_to_the_same_parameters)
