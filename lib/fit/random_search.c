@@ -13,6 +13,7 @@
 #define MOST_INSTANCES 8       /* guides of a strand */
 #define LOCAL 5                /* both, around what there is */
 #define LOCAL_PASSES 2
+#define MOST_HALVED 64         /* curls that tell how far halves of their strands are apart: a median of so many is one of all */
 #define TURNS_PER_RATE 0.3     /* at a strand's tip from one frequency to the next */
 #define PERIOD (1.0f / 3.9f)   /* of u2: a whole turn */
 
@@ -365,11 +366,14 @@ void random_search_curls(struct random_search *search, uint32_t active, uint32_t
     parallel_for(context, count, curl_piece, &job);
 }
 
-static void halves_piece(void *user, uint32_t guide, uint32_t thread)
+/* Curls from one that is halved to the next. */
+static uint32_t halved_every(const struct groom *groom) { return (groom->n_operator_guides + MOST_HALVED - 1) / MOST_HALVED; }
+
+static void halves_piece(void *user, uint32_t piece, uint32_t thread)
 {
     const struct curls_job *job = user;
     const struct groom_operator *op = operator_of(job->search, job->active);
-    uint32_t n_rates = rates_of(job, guide);
+    uint32_t guide = piece * halved_every(job->search->plan.groom), n_rates = rates_of(job, guide);
     for (uint32_t h = 0; h < 2; h++) {
         struct curls_job half = *job;
         float u[2] = {op->random[0][guide], op->random[1][guide]};
@@ -389,7 +393,10 @@ void random_search_halves(struct random_search *search, uint32_t active, const s
                           float (*half)[2], const struct groom_context *context)
 {
     struct curls_job job = {search, groups, active, 0, 0, 1, half};
-    parallel_for(context, search->plan.groom->n_operator_guides, halves_piece, &job);
+    uint32_t n = search->plan.groom->n_operator_guides, every = halved_every(search->plan.groom);
+    for (uint32_t o = 0; o < n; o++)
+        half[o][0] = half[o][1] = NAN;
+    parallel_for(context, (n + every - 1) / every, halves_piece, &job);
 }
 
 /* --- the operator guide of a strand ----------------------------------------------------------------- */

@@ -56,8 +56,8 @@ struct random_search_groups {
 void random_search_curls(struct random_search *search, uint32_t active, uint32_t first, uint32_t count,
                          const struct random_search_groups *groups, const struct groom_context *context);
 
-/* The first number of each operator guide, looked for around what it has by one half of the strands that are asked
- * alone, and by the other; NAN where a half has none.
+/* The first number of operator guides all over the head, looked for around what it has by one half of the strands that
+ * are asked alone, and by the other; NAN for other guides, and where a half has none.
  * half  [n_gop][2] out */
 void random_search_halves(struct random_search *search, uint32_t active, const struct random_search_groups *groups,
                           float (*half)[2], const struct groom_context *context);

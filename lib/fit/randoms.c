@@ -48,10 +48,10 @@
 
 /* What is looked for: which operator guide each strand follows, the numbers of strands in one operator,
  * those of operator guides, the law that these follow, the last digits of all that a strand has, what these tell of
- * how long guides are, or the guides that go with them and the operators' parameters for these guides; at the end, how
+ * how long guides are, the guides that go with them, or these and the operators' parameters for them; at the end, how
  * strong frizz is for all that was found, and what is in the head. */
 struct pass {
-    enum { FOLLOW, STRANDS, CURLS, LAW, POLISH, CENTRE, RESHAPE, CALIBRATE, CLEAR } kind;
+    enum { FOLLOW, STRANDS, CURLS, LAW, POLISH, CENTRE, GUIDES, RESHAPE, CALIBRATE, CLEAR } kind;
     uint32_t round;
     uint32_t op, active; /* of STRANDS, CURLS and LAW: its index in the chain, and among those that are enabled */
     int wide;            /* of CURLS and LAW: a look at more frequencies than there may be, for the law to begin with */
@@ -95,9 +95,13 @@ static uint32_t list_numbers(const struct groom *groom, uint32_t round, int per_
 static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST_PASSES])
 {
     uint32_t n = 0, n_rounds = fit->options.stages.randoms.rounds;
-    for (uint32_t round = 0; round < n_rounds && n + 4 * GROOM_FIT_MAX_OPERATORS + 5 <= MOST_PASSES; round++) {
+    for (uint32_t round = 0; round < n_rounds && n + 4 * GROOM_FIT_MAX_OPERATORS + 6 <= MOST_PASSES; round++) {
         uint32_t n_curls = list_numbers(fit->groom, round, 1, passes + n), begin = n;
         n += n_curls;
+        if (round > 0 && n_curls > 0) { /* guides and curls hold of each other: what is one's comes back to it step by step */
+            passes[n++] = (struct pass){.kind = GUIDES, .round = round};
+            n += list_numbers(fit->groom, round, 1, passes + n);
+        }
         if (n_curls > 0 || clumps(fit->groom))
             passes[n++] = (struct pass){.kind = FOLLOW, .round = round};
         n += list_numbers(fit->groom, round, 0, passes + n);
@@ -118,7 +122,8 @@ static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST
 
 static uint32_t size_of(const struct groom_fit *fit, const struct pass *pass)
 {
-    if (pass->kind == LAW || pass->kind == CENTRE || pass->kind == RESHAPE || pass->kind == CALIBRATE)
+    if (pass->kind == LAW || pass->kind == CENTRE || pass->kind == GUIDES || pass->kind == RESHAPE ||
+        pass->kind == CALIBRATE)
         return 1;
     return pass->kind == CURLS ? fit->groom->n_operator_guides : fit->n;
 }
@@ -295,6 +300,7 @@ static uint32_t step_size(const struct groom_fit *fit, const struct pass *pass)
     case POLISH: values = POLISH_VALUES; break;
     case LAW:
     case CENTRE:
+    case GUIDES:
     case RESHAPE:
     case CALIBRATE: return left;
     case CLEAR: values = CLEAR_VALUES; break;
@@ -325,6 +331,7 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
         return GROOM_OK;
     case CLEAR: return head_clear(search, fit->iteration, count, context, diag);
     case CENTRE:
+    case GUIDES:
     case RESHAPE:
     case CALIBRATE: break;
     }
@@ -389,6 +396,7 @@ static groom_status pass_step(struct groom_fit *fit, const struct pass *pass, co
 {
     uint32_t count = step_size(fit, pass);
     groom_status st = pass->kind == CENTRE      ? centre_step(fit)
+                      : pass->kind == GUIDES    ? guides_refine(fit, context, diag)
                       : pass->kind == RESHAPE   ? reshape_step(fit, context, diag)
                       : pass->kind == CALIBRATE ? calibrate_frizz(fit, context, diag)
                                                 : search_step(fit, pass, count, context, diag);
