@@ -79,9 +79,10 @@ static groom_status measure(struct random_search *search, const uint32_t *strand
 {
     const struct groom_fit *fit = search->fit;
     struct looking job = {fit->bvh, (const float (*)[3])points, (const float (*)[3])target, n, fit->m, standing};
-    groom_status st = gather_strands(fit, strand, n, points, target, context, diag);
+    groom_status st = gather_evaluated(fit, strand, n, points, context, diag);
     if (st != GROOM_OK)
         return st;
+    gather_targets(fit, strand, n, target);
     parallel_for(context, (n + STRANDS_PER_PIECE - 1) / STRANDS_PER_PIECE, look_piece, &job);
     float price = search->weights.depth;
     search->weights.depth = 0;
