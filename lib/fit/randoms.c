@@ -291,10 +291,27 @@ static int is_last(const struct groom_fit *fit, const struct pass *pass)
     return pass->round + 1 == fit->options.stages.randoms.rounds;
 }
 
+static groom_status clear_head(struct groom_fit *fit, struct random_search *search, uint32_t count,
+                               const struct groom_context *context, struct groom_diag *diag)
+{
+    struct groom_fit_report *report = &fit->report;
+    struct head_left left;
+    groom_status st = head_clear(search, fit->iteration, count, &left, context, diag);
+    if (st != GROOM_OK)
+        return st;
+    if (fit->iteration == 0)
+        report->n_in_head = report->n_beyond_target = 0;
+    report->n_in_head += left.n_deep;
+    report->n_beyond_target += left.n_beyond;
+    if (fit->iteration + count == fit->n && report->n_in_head > 0)
+        report_note(report, "%u strands are left more than %.1f mm deep in the head, %u of them deeper than their targets.",
+                    report->n_in_head, 1000 * (double)left.depth, report->n_beyond_target);
+    return GROOM_OK;
+}
+
 static groom_status search_pass(struct groom_fit *fit, struct random_search *search, const struct pass *pass,
                                 uint32_t count, const struct groom_context *context, struct groom_diag *diag)
 {
-    struct head_left left;
     switch (pass->kind) {
     case FOLLOW: return search_guides(fit, search, count, context, diag);
     case STRANDS:
@@ -307,7 +324,7 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
         random_search_polish(search, fit->iteration, count, is_last(fit, pass) ? POLISH_STEPS : 1,
                              (float)fit->options.stages.randoms.hold, is_last(fit, pass), context);
         return GROOM_OK;
-    case CLEAR: return head_clear(search, fit->iteration, count, &left, context, diag);
+    case CLEAR: return clear_head(fit, search, count, context, diag);
     case CENTRE:
     case RESHAPE:
     case CALIBRATE: break;

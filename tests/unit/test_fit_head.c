@@ -110,6 +110,17 @@ static void press(struct groom_sample *sample, float by)
     groom_bvh_destroy(head);
 }
 
+/* The report tells what is left in. */
+static void is_told(const struct groom_fit_report *report, uint32_t n_beyond)
+{
+    int said = 0;
+    for (uint32_t k = 0; k < report->n_notes; k++)
+        said |= strstr(report->notes[k], "deep in the head") != NULL;
+    ck_assert_int_eq(said, report->n_in_head > 0);
+    ck_assert_uint_le(n_beyond, report->n_beyond_target);
+    ck_assert_uint_le(report->n_beyond_target, report->n_in_head);
+}
+
 static void stays_out(groom_sample_style style, float pressed, uint32_t most)
 {
     struct groom_sample *sample = guides_sample(style, N, M, 5, NULL);
@@ -129,6 +140,7 @@ static void stays_out(groom_sample_style style, float pressed, uint32_t most)
     }
     ck_assert_msg(n_in <= most, "%u of %u strands are more than 1 mm deeper in the head than their targets, %.1f mm the deepest",
                   n_in, fit->n, 1000 * (double)worst);
+    is_told(groom_fit_get_report(fit), n_in);
     free(x);
     groom_fit_destroy(fit);
     groom_sample_destroy(sample);
