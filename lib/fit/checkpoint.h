@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 
-#define CHECKPOINT_VERSION 5
+#define CHECKPOINT_VERSION 6
 
 struct checkpoint_header {
     char magic[8];          /* "GROOMFIT" */

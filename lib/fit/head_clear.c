@@ -5,16 +5,22 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "fit/follow.h"
 #include "fit/gather.h"
 #include "geometry/side.h"
 #include "groom/spatial.h"
 
 #define DEEP 0.0005      /* metres in the head of ordinary size that are too deep */
+#define LEFT 0.001       /* that are told of */
 #define STIFF 10.0f      /* times what depth costs while numbers are looked for */
-#define CANDIDATES 24    /* guides near a strand */
+#define GAIN 0.3f        /* share of its error that another operator guide must be better by */
+#define NEAR 96          /* operator guides, and guides, around a strand that it gets first, */
+#define AFAR 500         /* and guides where it stays in with these */
+#define TRIES 16         /* with other guides; in each, depth costs twice what it did in the one before */
 #define CHUNK 4000       /* strands that are looked at together */
 #define STRANDS_PER_PIECE 16
 #define STEPS 3          /* of Newton */
+#define AS_NEAR 1.05f    /* times what it was: the error with which a strand is still as near to its target */
 #define VALUES 24        /* of a number, over its range */
 #define HALVINGS 3
 #define HOLD 0.001f      /* moving a weight is cheap here */
@@ -79,9 +85,10 @@ static groom_status measure(struct random_search *search, const uint32_t *strand
 {
     const struct groom_fit *fit = search->fit;
     struct looking job = {fit->bvh, (const float (*)[3])points, (const float (*)[3])target, n, fit->m, standing};
-    groom_status st = gather_strands(fit, strand, n, points, target, context, diag);
+    groom_status st = gather_evaluated(fit, strand, n, points, context, diag);
     if (st != GROOM_OK)
         return st;
+    gather_targets(fit, strand, n, target);
     parallel_for(context, (n + STRANDS_PER_PIECE - 1) / STRANDS_PER_PIECE, look_piece, &job);
     float price = search->weights.depth;
     search->weights.depth = 0;
@@ -99,6 +106,7 @@ struct kept {
     const uint32_t *strand; /* [n] borrowed, or NULL: from `first` on */
     uint32_t first, n, k;
     uint32_t *guide;  /* [n * k] */
+    uint32_t *follows; /* [n] */
     float *weight;    /* [n * k] */
     float *number;    /* [operators][n] of those that draw one a strand */
 };
@@ -113,12 +121,13 @@ static groom_status keep(struct kept *kept, const struct groom *groom, const uin
 {
     uint32_t k = groom->n_instancing;
     *kept = (struct kept){strand, first, n, k, memory_array(allocator, (size_t)n * k, sizeof *kept->guide),
-                          memory_array(allocator, (size_t)n * k, sizeof *kept->weight),
+                          memory_array(allocator, n, sizeof *kept->follows), memory_array(allocator, (size_t)n * k, sizeof *kept->weight),
                           memory_array(allocator, (size_t)n * GROOM_FIT_MAX_OPERATORS, sizeof *kept->number)};
-    if (!kept->guide || !kept->weight || !kept->number)
+    if (!kept->guide || !kept->follows || !kept->weight || !kept->number)
         return groom_fail(diag, GROOM_ENOMEM, "no memory to take %u strands out of the head", n);
     for (uint32_t at = 0; at < n; at++) {
         size_t i = strand ? strand[at] : first + at;
+        kept->follows[at] = groom->operator_guide_of[i];
         memcpy(kept->guide + (size_t)at * k, groom->instancing_guide + i * k, k * sizeof *kept->guide);
         memcpy(kept->weight + (size_t)at * k, groom->instancing_weight + i * k, k * sizeof *kept->weight);
         for (uint32_t o = 0; o < groom->n_operators; o++)
@@ -131,6 +140,7 @@ static groom_status keep(struct kept *kept, const struct groom *groom, const uin
 static void give_back(const struct kept *kept, struct groom *groom, uint32_t at)
 {
     size_t k = kept->k, i = kept->strand ? kept->strand[at] : kept->first + at;
+    groom->operator_guide_of[i] = kept->follows[at];
     memcpy(groom->instancing_guide + i * k, kept->guide + at * k, k * sizeof *kept->guide);
     memcpy(groom->instancing_weight + i * k, kept->weight + at * k, k * sizeof *kept->weight);
     for (uint32_t o = 0; o < groom->n_operators; o++)
@@ -141,32 +151,69 @@ static void give_back(const struct kept *kept, struct groom *groom, uint32_t at)
 static void kept_finish(struct kept *kept, const struct groom_allocator *allocator)
 {
     memory_release(allocator, kept->guide, (size_t)kept->n * kept->k, sizeof *kept->guide);
+    memory_release(allocator, kept->follows, kept->n, sizeof *kept->follows);
     memory_release(allocator, kept->weight, (size_t)kept->n * kept->k, sizeof *kept->weight);
     memory_release(allocator, kept->number, (size_t)kept->n * GROOM_FIT_MAX_OPERATORS, sizeof *kept->number);
 }
 
 /* --- ways out ---------------------------------------------------------------------------------- */
 
-/* Other guides near each strand; one at first, which the polish then mixes. */
-static groom_status choose_guides(struct random_search *search, uint32_t n, const struct groom_context *context,
-                                  struct groom_diag *diag)
+static uint32_t lesser(uint32_t a, uint32_t b) { return a < b ? a : b; }
+
+/* What is near strands of the search. */
+struct near { float (*uv)[2]; uint32_t n, k, *candidate; /* [n], [n * k] */ };
+
+static groom_status near_init(struct near *near, const struct random_search *search, uint32_t n, uint32_t k,
+                              const struct groom_allocator *allocator, struct groom_diag *diag)
+{
+    *near = (struct near){memory_array(allocator, n, sizeof *near->uv), n, k,
+                          memory_array(allocator, (size_t)n * k, sizeof *near->candidate)};
+    if (!near->uv || !near->candidate)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to choose guides");
+    for (uint32_t at = 0; at < n; at++)
+        memcpy(near->uv[at], search->fit->groom->root_uv[search->only[at]], sizeof *near->uv);
+    return GROOM_OK;
+}
+
+static void near_finish(struct near *near, const struct groom_allocator *allocator)
+{
+    memory_release(allocator, near->uv, near->n, sizeof *near->uv);
+    memory_release(allocator, near->candidate, (size_t)near->n * near->k, sizeof *near->candidate);
+}
+
+/* Other operator guides, where their curl or clump is what draws strands in. */
+static groom_status choose_operator_guides(struct random_search *search, uint32_t n, const struct groom_context *context,
+                                           struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     const struct groom *groom = search->fit->groom;
+    struct near near;
+    groom_status st = near_init(&near, search, n, lesser(NEAR, groom->n_operator_guides), allocator, diag);
+    if (st == GROOM_OK &&
+        (st = follow_candidates(groom, (const float (*)[2])near.uv, n, near.k, near.candidate, context, diag)) == GROOM_OK)
+        random_search_guides(search, 0, n, near.candidate, near.k, GAIN, context);
+    near_finish(&near, allocator);
+    return st;
+}
+
+/* Other guides for each strand; one at first, which the polish then mixes. Of those near it, the best n_tried are passed
+ * over, as long as there are others. */
+static groom_status choose_guides(struct random_search *search, uint32_t n, uint32_t n_near, uint32_t n_tried,
+                                  const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    const struct groom *groom = search->fit->groom;
+    uint32_t k = lesser(n_near, groom->n_guides), skip = lesser(n_tried, k - lesser(groom->n_instancing, k));
     struct groom_neighbours *index = NULL;
-    float (*uv)[2] = memory_array(allocator, n, sizeof *uv);
-    uint32_t *candidate = memory_array(allocator, (size_t)n * CANDIDATES, sizeof *candidate);
-    groom_status st = uv && candidate ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to choose guides");
-    for (uint32_t at = 0; st == GROOM_OK && at < n; at++)
-        memcpy(uv[at], groom->root_uv[search->only[at]], sizeof *uv);
+    struct near near;
+    groom_status st = near_init(&near, search, n, k, allocator, diag);
     if (st == GROOM_OK)
         st = groom_neighbours_create(groom->guide_uv[0], groom->n_guides, 2, context, &index, diag);
     if (st == GROOM_OK &&
-        (st = groom_neighbours_find(index, uv[0], n, CANDIDATES, candidate, NULL, context, diag)) == GROOM_OK)
-        random_search_instances(search, n, candidate, CANDIDATES, context);
+        (st = groom_neighbours_find(index, near.uv[0], n, k, near.candidate, NULL, context, diag)) == GROOM_OK)
+        random_search_instances(search, n, near.candidate, k, skip, context);
     groom_neighbours_destroy(index);
-    memory_release(allocator, uv, n, sizeof *uv);
-    memory_release(allocator, candidate, (size_t)n * CANDIDATES, sizeof *candidate);
+    near_finish(&near, allocator);
     return st;
 }
 
@@ -180,16 +227,41 @@ static void search_numbers(struct random_search *search, uint32_t n, const struc
     }
 }
 
-/* First all that is in the head, then what is deeper in it than its target: from where it is, from other guides. */
-enum way { WITHDRAWN, NUDGED, BLENDED_ANEW, NUDGED_AGAIN, N_WAYS };
+/* What is deeper in the head than its target: from where it is; then, try by try, from other guides and on from there.
+ * Planes beside the target tell little of where a strand far from it is in the head, so that the guides that promise most
+ * may not keep what they promise, and others are tried. At last all that is in the head. */
+struct way {
+    enum { NUDGED, BLENDED_ANEW, WITHDRAWN } kind;
+    uint32_t n_tries; /* before this one */
+};
+#define N_WAYS (1 + 2 * TRIES + 1)
+_Static_assert(TRIES <= RANDOM_SEARCH_SKIP + 1, "a try passes over those of all before it");
 
-static groom_status take(enum way way, struct random_search *search, uint32_t n, const struct groom_context *context,
+static struct way way_at(uint32_t k)
+{
+    if (k + 1 == N_WAYS)
+        return (struct way){WITHDRAWN, 0};
+    return (struct way){k % 2 ? BLENDED_ANEW : NUDGED, k < 2 ? 0 : (k - 1) / 2};
+}
+
+static groom_status blend_anew(struct random_search *search, uint32_t n, uint32_t n_tries,
+                               const struct groom_context *context, struct groom_diag *diag)
+{
+    groom_status st = choose_operator_guides(search, n, context, diag);
+    if (st == GROOM_OK)
+        st = choose_guides(search, n, n_tries == 0 ? NEAR : AFAR, n_tries, context, diag);
+    if (st == GROOM_OK)
+        search_numbers(search, n, context);
+    return st;
+}
+
+static groom_status take(struct way way, struct random_search *search, uint32_t n, const struct groom_context *context,
                          struct groom_diag *diag)
 {
     groom_status st = GROOM_OK;
-    search->out_of_head = way == WITHDRAWN;
-    if (way == BLENDED_ANEW && (st = choose_guides(search, n, context, diag)) == GROOM_OK)
-        search_numbers(search, n, context);
+    search->out_of_head = way.kind == WITHDRAWN;
+    if (way.kind == BLENDED_ANEW)
+        st = blend_anew(search, n, way.n_tries, context, diag);
     if (st == GROOM_OK)
         random_search_polish(search, 0, n, STEPS, HOLD, 1, context);
     return st;
@@ -199,83 +271,99 @@ static groom_status take(enum way way, struct random_search *search, uint32_t n,
 
 struct clearing {
     struct random_search *search;
-    uint32_t n;
-    uint32_t *strand;             /* [n] those that are too deep */
-    struct standing before, after;
-    float (*points)[3], (*target)[3]; /* [n * m] scratch */
-    float deep;
+    uint32_t first, count;            /* the strands that are looked at together */
+    uint32_t n, *strand;              /* [n <= count] those of them that a way is tried for */
+    struct standing now, after;       /* [count] of all; [n] of what the way makes of them */
+    float (*points)[3], (*target)[3]; /* [count * m] scratch */
+    float deep, price;                /* of depth, at first */
 };
 
-/* Those that are deep still, or deeper than their targets, in order. */
-static void keep_deep(struct clearing *job, enum way way)
+/* The strands that a way is for. */
+static void list_for(struct clearing *job, struct way way)
 {
-    uint32_t n = 0;
-    for (uint32_t at = 0; at < job->n; at++)
-        if ((way == WITHDRAWN ? job->before.depth : job->before.beyond)[at] > job->deep) {
-            job->strand[n] = job->strand[at];
-            job->before.depth[n] = job->before.depth[at];
-            job->before.beyond[n] = job->before.beyond[at];
-            job->before.error[n++] = job->before.error[at];
-        }
-    job->n = n;
+    const float *depth = way.kind == WITHDRAWN ? job->now.depth : job->now.beyond;
+    job->n = 0;
+    for (uint32_t at = 0; at < job->count; at++)
+        if (depth[at] > job->deep)
+            job->strand[job->n++] = job->first + at;
 }
 
 /* A strand that is deeper in the head than its target comes out at any cost; one that follows it in, only where it comes
- * out as near to it as it was. */
+ * out about as near to it as it was. */
 static int is_better(const struct clearing *job, uint32_t at)
 {
-    const struct standing *before = &job->before, *after = &job->after;
-    if (before->beyond[at] > job->deep)
-        return after->beyond[at] < before->beyond[at];
-    return after->beyond[at] <= job->deep && after->depth[at] < before->depth[at] && after->error[at] <= before->error[at];
+    const struct standing *now = &job->now, *after = &job->after;
+    uint32_t i = job->strand[at] - job->first;
+    if (now->beyond[i] > job->deep)
+        return after->beyond[at] < now->beyond[i];
+    return after->beyond[at] <= job->deep && after->depth[at] < now->depth[i] && after->error[at] <= AS_NEAR * now->error[i];
 }
 
-static groom_status try_way(struct clearing *job, enum way way, const struct groom_context *context, struct groom_diag *diag)
+static void keep_better(struct clearing *job, const struct kept *before)
+{
+    for (uint32_t at = 0; at < job->n; at++) {
+        uint32_t i = job->strand[at] - job->first;
+        if (is_better(job, at)) {
+            job->now.depth[i] = job->after.depth[at];
+            job->now.beyond[i] = job->after.beyond[at];
+            job->now.error[i] = job->after.error[at];
+        } else
+            give_back(before, job->search->fit->groom, at);
+    }
+}
+
+static groom_status try_way(struct clearing *job, struct way way, const struct groom_context *context,
+                            struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
-    struct groom *groom = job->search->fit->groom;
-    struct kept kept;
-    groom_status st = keep(&kept, groom, job->strand, 0, job->n, allocator, diag);
+    struct kept before;
+    groom_status st = keep(&before, job->search->fit->groom, job->strand, 0, job->n, allocator, diag);
     job->search->only = job->strand;
+    job->search->weights.depth = ldexpf(job->price, (int)way.n_tries);
     if (st == GROOM_OK && (st = take(way, job->search, job->n, context, diag)) == GROOM_OK &&
         (st = measure(job->search, job->strand, job->n, job->points, job->target, &job->after, context, diag)) == GROOM_OK)
-        for (uint32_t at = 0; at < job->n; at++) {
-            if (is_better(job, at)) {
-                job->before.depth[at] = job->after.depth[at];
-                job->before.beyond[at] = job->after.beyond[at];
-                job->before.error[at] = job->after.error[at];
-            } else
-                give_back(&kept, groom, at);
-        }
-    kept_finish(&kept, allocator);
+        keep_better(job, &before);
+    kept_finish(&before, allocator);
     return st;
 }
 
-static groom_status clear_chunk(struct clearing *job, uint32_t first, uint32_t count, const struct groom_context *context,
-                                struct groom_diag *diag)
+static void count_left(const struct clearing *job, struct head_left *left)
+{
+    for (uint32_t at = 0; at < job->count; at++) {
+        left->n_deep += job->now.depth[at] > left->depth;
+        left->n_beyond += job->now.beyond[at] > left->depth;
+    }
+}
+
+static groom_status clear_chunk(struct clearing *job, uint32_t first, uint32_t count, struct head_left *left,
+                                const struct groom_context *context, struct groom_diag *diag)
 {
     groom_status st;
-    job->n = count;
+    job->first = first;
+    job->count = count;
     for (uint32_t at = 0; at < count; at++)
         job->strand[at] = first + at;
-    if ((st = measure(job->search, job->strand, count, job->points, job->target, &job->before, context, diag)) != GROOM_OK)
+    if ((st = measure(job->search, job->strand, count, job->points, job->target, &job->now, context, diag)) != GROOM_OK)
         return st;
-    for (int way = 0; st == GROOM_OK && way < N_WAYS; way++) {
-        keep_deep(job, way);
+    for (uint32_t k = 0; st == GROOM_OK && k < N_WAYS; k++) {
+        list_for(job, way_at(k));
         if (job->n > 0)
-            st = try_way(job, way, context, diag);
+            st = try_way(job, way_at(k), context, diag);
     }
+    count_left(job, left);
     return st;
 }
 
 #define N_FLOATS 6 /* a strand */
 
-groom_status head_clear(struct random_search *search, uint32_t first, uint32_t count, const struct groom_context *context,
-                        struct groom_diag *diag)
+groom_status head_clear(struct random_search *search, uint32_t first, uint32_t count, struct head_left *left,
+                        const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
-    uint32_t size = count < CHUNK ? count : CHUNK, m = search->fit->m;
-    struct clearing job = {.search = search, .deep = (float)DEEP * search->fit->ordinary};
+    uint32_t size = lesser(count, CHUNK), m = search->fit->m;
+    struct clearing job = {.search = search, .deep = (float)DEEP * search->fit->ordinary,
+                           .price = STIFF * search->weights.depth};
+    struct head_left found = {.depth = (float)LEFT * search->fit->ordinary};
     struct kept whole;
     groom_status st = keep(&whole, search->fit->groom, NULL, first, count, allocator, diag);
     int is_kept = st == GROOM_OK;
@@ -286,14 +374,15 @@ groom_status head_clear(struct random_search *search, uint32_t first, uint32_t c
     if (st == GROOM_OK && !(floats && job.strand && job.points && job.target))
         st = groom_fail(diag, GROOM_ENOMEM, "no memory to look for strands in the head");
     if (st == GROOM_OK) {
-        job.before = (struct standing){floats, floats + size, floats + 2 * (size_t)size};
+        job.now = (struct standing){floats, floats + size, floats + 2 * (size_t)size};
         job.after = (struct standing){floats + 3 * (size_t)size, floats + 4 * (size_t)size, floats + 5 * (size_t)size};
-        search->weights.depth *= STIFF;
     }
     for (uint32_t at = 0; st == GROOM_OK && at < count; at += size)
-        st = clear_chunk(&job, first + at, count - at < size ? count - at : size, context, diag);
+        st = clear_chunk(&job, first + at, lesser(count - at, size), &found, context, diag);
     for (uint32_t at = 0; is_kept && st != GROOM_OK && at < count; at++) /* a step that fails has changed nothing */
         give_back(&whole, search->fit->groom, at);
+    if (st == GROOM_OK)
+        *left = found;
     kept_finish(&whole, allocator);
     memory_release(allocator, floats, (size_t)size * N_FLOATS, sizeof *floats);
     memory_release(allocator, job.strand, size, sizeof *job.strand);

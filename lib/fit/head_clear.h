@@ -4,14 +4,22 @@
 
 #include "fit/random_search.h"
 
+/* What is left in the head, of strands that were looked at. */
+struct head_left {
+    float depth;                /* metres from which on a strand counts */
+    uint32_t n_deep, n_beyond;  /* so deep in the head, and so much deeper in it than the deepest of their targets */
+};
+
 /* Strands first .. first + count - 1 that are in the head take Newton's steps with a stiff price on depth. Those that are
- * deeper in than the deepest of their targets come out at any cost, if need be blended from others of the guides near
- * them; those that follow their targets in, only where they come out as near to these as they were. What does not come
- * out has its own back: a groom has no vertices of single strands, and a curl is shared by all strands of its operator
- * guide, so that some stay in.
+ * deeper in than the deepest of their targets come out at any cost, if need be by another operator guide near them and
+ * blended from other guides: those around them, then those farther off, one after the other, at an ever stiffer price.
+ * Those that follow their targets in come out only where they are about as near to these as they were. What does not come
+ * out has its own back: a groom has no vertices of single strands.
  * search   of the fit's groom; its weights are those of its last pass
- * returns  GROOM_OK, GROOM_ENOMEM */
+ * left     out
+ * returns  GROOM_OK, GROOM_ENOMEM; nothing has changed on error */
 GROOM_MUST_CHECK groom_status head_clear(struct random_search *search, uint32_t first, uint32_t count,
-                                         const struct groom_context *context, struct groom_diag *diag);
+                                         struct head_left *left, const struct groom_context *context,
+                                         struct groom_diag *diag);
 
 #endif

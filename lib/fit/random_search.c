@@ -11,6 +11,7 @@
 #define MOST_RATES 33          /* frequencies of a curl that are tried */
 #define PHASES 6               /* in a turn */
 #define MOST_INSTANCES 8       /* guides of a strand */
+#define MOST_RANKED (MOST_INSTANCES + RANDOM_SEARCH_SKIP)
 #define LOCAL 5                /* both, around what there is */
 #define LOCAL_PASSES 2
 #define MOST_HALVED 64         /* curls that tell how far halves of their strands are apart: a median of so many is one of all */
@@ -405,7 +406,8 @@ struct guides_job {
     struct random_search *search;
     const uint32_t *candidate;
     uint32_t first, count, n_candidates;
-    float gain;
+    float gain;    /* of operator guides */
+    uint32_t skip; /* of guides */
 };
 
 static void follow_block(const struct guides_job *job, struct random_search_memory *memory, const struct block *block,
@@ -451,7 +453,7 @@ static void follow_piece(void *user, uint32_t piece, uint32_t thread)
 void random_search_guides(struct random_search *search, uint32_t first, uint32_t count, const uint32_t *candidate,
                           uint32_t n_candidates, float gain, const struct groom_context *context)
 {
-    struct guides_job job = {search, candidate, first, count, n_candidates, gain};
+    struct guides_job job = {search, candidate, first, count, n_candidates, gain, 0};
     parallel_for(context, (count + RANDOM_BLOCK_PIECE - 1) / RANDOM_BLOCK_PIECE, follow_piece, &job);
 }
 
@@ -510,10 +512,11 @@ static void instance_block(const struct guides_job *job, struct random_search_me
                            const uint32_t *candidate)
 {
     struct groom *groom = job->search->fit->groom;
-    uint32_t k = groom->n_instancing < MOST_INSTANCES ? groom->n_instancing : MOST_INSTANCES, best[LANES][MOST_INSTANCES];
-    float least[LANES][MOST_INSTANCES];
+    uint32_t k = groom->n_instancing < MOST_INSTANCES ? groom->n_instancing : MOST_INSTANCES, n = k + job->skip;
+    uint32_t best[LANES][MOST_RANKED];
+    float least[LANES][MOST_RANKED];
     for (uint32_t l = 0; l < LANES; l++)
-        for (uint32_t a = 0; a < MOST_INSTANCES; a++)
+        for (uint32_t a = 0; a < MOST_RANKED; a++)
             best[l][a] = candidate[(size_t)(l < block->n ? l : 0) * job->n_candidates], least[l][a] = INFINITY;
     for (uint32_t c = 0; c < job->n_candidates; c++) {
         lanes error;
@@ -528,10 +531,10 @@ static void instance_block(const struct guides_job *job, struct random_search_me
         random_block_evaluate(job->search, memory, random_block_start(memory), 0, error);
         for (uint32_t l = 0; l < block->n; l++)
             if (candidate[(size_t)l * job->n_candidates + c] != UINT32_MAX)
-                rank(candidate[(size_t)l * job->n_candidates + c], error[l], k, best[l], least[l]);
+                rank(candidate[(size_t)l * job->n_candidates + c], error[l], n, best[l], least[l]);
     }
     for (uint32_t l = 0; l < block->n; l++)
-        set_guides(groom, block->strand[l], best[l]);
+        set_guides(groom, block->strand[l], best[l] + job->skip);
 }
 
 static void instance_piece(void *user, uint32_t piece, uint32_t thread)
@@ -546,8 +549,8 @@ static void instance_piece(void *user, uint32_t piece, uint32_t thread)
 }
 
 void random_search_instances(struct random_search *search, uint32_t count, const uint32_t *candidate, uint32_t n_candidates,
-                             const struct groom_context *context)
+                             uint32_t skip, const struct groom_context *context)
 {
-    struct guides_job job = {search, candidate, 0, count, n_candidates, 0};
+    struct guides_job job = {search, candidate, 0, count, n_candidates, 0, skip};
     parallel_for(context, (count + RANDOM_BLOCK_PIECE - 1) / RANDOM_BLOCK_PIECE, instance_piece, &job);
 }

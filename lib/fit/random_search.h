@@ -72,11 +72,13 @@ void random_search_guides(struct random_search *search, uint32_t first, uint32_t
 /* error [count] of strands 0 .. count - 1 as they stand. */
 void random_search_errors(struct random_search *search, uint32_t count, float *error, const struct groom_context *context);
 
-/* Other guides for strands first .. first + count - 1: the one with which alone they come nearest to their targets, then
+/* Other guides for strands 0 .. count - 1: the one with which alone they come nearest to their targets, then
  * the next, as many as strands have, at no weight.
- * candidate  [count][n_candidates] guides, UINT32_MAX: none; the first of each is one */
+ * candidate  [count][n_candidates] guides, UINT32_MAX: none; the first of each is one
+ * skip       how many of the best are passed over, RANDOM_SEARCH_SKIP at most */
+#define RANDOM_SEARCH_SKIP 16
 void random_search_instances(struct random_search *search, uint32_t count, const uint32_t *candidate, uint32_t n_candidates,
-                             const struct groom_context *context);
+                             uint32_t skip, const struct groom_context *context);
 
 /* All numbers of strands first .. first + count - 1 at once, and, where it is wanted, their instancing weights:
  * Newton's steps on their errors, from where they are. Weights stay at least 0 and sum to 1.

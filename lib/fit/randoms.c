@@ -21,6 +21,7 @@
 #include "base/memory.h"
 #include "base/progress.h"
 #include "fit/calibrate.h"
+#include "fit/follow.h"
 #include "fit/frequencies.h"
 #include "fit/gather.h"
 #include "fit/guides.h"
@@ -251,31 +252,13 @@ static groom_status search_guides(struct groom_fit *fit, struct random_search *s
                                   const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
-    struct groom *groom = fit->groom;
-    uint32_t n = groom->n_operator_guides;
-    struct groom_neighbours *index = NULL;
-    uint8_t *used = memory_array_zero(allocator, n, 1);
-    float (*uv)[2] = memory_array(allocator, n, sizeof *uv);
+    const float (*uv)[2] = (const float (*)[2])(fit->groom->root_uv + fit->iteration);
     uint32_t *candidate = memory_array(allocator, (size_t)count * CANDIDATES, sizeof *candidate);
-    groom_status st = used && uv && candidate ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to choose operator guides");
-    if (st != GROOM_OK)
-        goto out;
-    for (uint32_t i = 0; i < groom->n_strands; i++)
-        used[groom->operator_guide_of[i]] = 1;
-    for (uint32_t o = 0; o < n; o++)
-        memcpy(uv[o], groom->guide_uv[groom->operator_guide[o]], sizeof uv[o]);
-    if ((st = groom_neighbours_create(uv[0], n, 2, context, &index, diag)) != GROOM_OK ||
-        (st = groom_neighbours_find(index, groom->root_uv[fit->iteration], count, CANDIDATES, candidate, NULL, context,
-                                    diag)) != GROOM_OK)
-        goto out;
-    for (size_t i = 0; i < (size_t)count * CANDIDATES; i++)
-        if (candidate[i] != UINT32_MAX && !used[candidate[i]])
-            candidate[i] = UINT32_MAX;
-    random_search_guides(search, fit->iteration, count, candidate, CANDIDATES, GAIN, context);
-out:
-    groom_neighbours_destroy(index);
-    memory_release(allocator, used, n, 1);
-    memory_release(allocator, uv, n, sizeof *uv);
+    groom_status st = candidate ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to choose operator guides");
+    if (st == GROOM_OK)
+        st = follow_candidates(fit->groom, uv, count, CANDIDATES, candidate, context, diag);
+    if (st == GROOM_OK)
+        random_search_guides(search, fit->iteration, count, candidate, CANDIDATES, GAIN, context);
     memory_release(allocator, candidate, (size_t)count * CANDIDATES, sizeof *candidate);
     return st;
 }
@@ -314,6 +297,24 @@ static int is_last(const struct groom_fit *fit, const struct pass *pass)
     return pass->round + 1 == fit->options.stages.randoms.rounds;
 }
 
+static groom_status clear_head(struct groom_fit *fit, struct random_search *search, uint32_t count,
+                               const struct groom_context *context, struct groom_diag *diag)
+{
+    struct groom_fit_report *report = &fit->report;
+    struct head_left left;
+    groom_status st = head_clear(search, fit->iteration, count, &left, context, diag);
+    if (st != GROOM_OK)
+        return st;
+    if (fit->iteration == 0)
+        report->n_in_head = report->n_beyond_target = 0;
+    report->n_in_head += left.n_deep;
+    report->n_beyond_target += left.n_beyond;
+    if (fit->iteration + count == fit->n && report->n_in_head > 0)
+        report_note(report, "%u strands are left more than %.1f mm deep in the head, %u of them deeper than their targets.",
+                    report->n_in_head, 1000 * (double)left.depth, report->n_beyond_target);
+    return GROOM_OK;
+}
+
 static groom_status search_pass(struct groom_fit *fit, struct random_search *search, const struct pass *pass,
                                 uint32_t count, const struct groom_context *context, struct groom_diag *diag)
 {
@@ -329,7 +330,7 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
         random_search_polish(search, fit->iteration, count, is_last(fit, pass) ? POLISH_STEPS : 1,
                              (float)fit->options.stages.randoms.hold, is_last(fit, pass), context);
         return GROOM_OK;
-    case CLEAR: return head_clear(search, fit->iteration, count, context, diag);
+    case CLEAR: return clear_head(fit, search, count, context, diag);
     case CENTRE:
     case GUIDES:
     case RESHAPE:

@@ -79,7 +79,9 @@ groom_status groom_fit_report_print(const struct groom_fit *fit, char **out, str
         cJSON_AddNumberToObject(json, "outliers", report->n_outliers) &&
         cJSON_AddNumberToObject(json, "unseen", report->n_unseen) &&
         cJSON_AddNumberToObject(json, "reassigned", report->n_reassigned) &&
-        cJSON_AddNumberToObject(json, "penetrating", report->n_penetrating) && put_losses(json, report) &&
+        cJSON_AddNumberToObject(json, "penetrating", report->n_penetrating) &&
+        cJSON_AddNumberToObject(json, "in_head", report->n_in_head) &&
+        cJSON_AddNumberToObject(json, "beyond_target", report->n_beyond_target) && put_losses(json, report) &&
         put_notes(json, report))
         text = cJSON_Print(json);
     cJSON_Delete(json);

@@ -3,8 +3,13 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "fit/assign.h"
 #include "fit/visibility.h"
+
+#define DEEP 0.0005 /* metres in the head of ordinary size that are too deep */
+#define TRIES 32    /* strands around one in the head that it may be like */
+#define CHUNK 4000  /* strands that are looked at together */
 
 /* --- out of the target ---------------------------------------------------------------------- */
 
@@ -176,25 +181,186 @@ static groom_status place_all(const struct groom_fit *fit, struct groom *groom, 
     return st;
 }
 
+/* Strand i of the whole gets all that strand k of the fit has but for its root. */
+static void copy_strand(const struct groom *from, uint32_t k, struct groom *groom, uint32_t i)
+{
+    uint32_t n_k = from->n_instancing;
+    memcpy(groom->instancing_guide + (size_t)i * n_k, from->instancing_guide + (size_t)k * n_k, n_k * sizeof *from->instancing_guide);
+    memcpy(groom->instancing_weight + (size_t)i * n_k, from->instancing_weight + (size_t)k * n_k, n_k * sizeof *from->instancing_weight);
+    groom->operator_guide_of[i] = from->operator_guide_of[k];
+    for (uint32_t o = 0; o < from->n_operators; o++) {
+        const struct groom_operator *a = &from->operators[o];
+        for (uint32_t r = 0; !groom_operator_random_per_guide(a->type) && r < groom_operator_random_arrays(a->type); r++)
+            groom->operators[o].random[r][i] = a->random[r][k];
+    }
+}
+
 /* Strand k of the fit is strand seen[k] of the whole. */
 static void copy_seen(const struct groom_fit *fit, struct groom *groom)
 {
     const struct groom *from = fit->groom;
-    uint32_t n_k = from->n_instancing;
-    for (uint32_t k = 0; k < fit->n; k++) {
-        uint32_t i = fit->all.seen[k];
-        memcpy(groom->instancing_guide + (size_t)i * n_k, from->instancing_guide + (size_t)k * n_k, n_k * sizeof *from->instancing_guide);
-        memcpy(groom->instancing_weight + (size_t)i * n_k, from->instancing_weight + (size_t)k * n_k, n_k * sizeof *from->instancing_weight);
-        groom->operator_guide_of[i] = from->operator_guide_of[k];
-    }
+    for (uint32_t k = 0; k < fit->n; k++)
+        copy_strand(from, k, groom, fit->all.seen[k]);
     for (uint32_t o = 0; o < from->n_operators; o++) {
         const struct groom_operator *a = &from->operators[o];
-        int per_guide = groom_operator_random_per_guide(a->type);
-        uint32_t n = per_guide ? from->n_operator_guides : fit->n;
-        for (uint32_t r = 0; r < groom_operator_random_arrays(a->type); r++)
-            for (uint32_t k = 0; k < n; k++)
-                groom->operators[o].random[r][per_guide ? k : fit->all.seen[k]] = a->random[r][k];
+        for (uint32_t r = 0; groom_operator_random_per_guide(a->type) && r < groom_operator_random_arrays(a->type); r++)
+            memcpy(groom->operators[o].random[r], a->random[r], from->n_operator_guides * sizeof *a->random[r]);
     }
+}
+
+/* --- out of the head ---------------------------------------------------------------------------- */
+
+/* Strands of a groom that lie in the head, or out of it. */
+struct lying {
+    const struct groom_fit *fit;
+    struct groom *groom;
+    int in;                   /* which are wanted */
+    float clearance;          /* metres in the head that do not count */
+    uint32_t n, *strand;      /* [n] */
+    float (*points)[3];       /* [CHUNK * m] */
+    unsigned char *is_in;     /* [CHUNK] */
+};
+
+static void look_piece(void *user, uint32_t at, uint32_t thread)
+{
+    const struct lying *job = user;
+    uint32_t m = job->groom->n_vertices;
+    (void)thread;
+    job->is_in[at] = assign_buried(job->fit->bvh, (const float (*)[3])job->points + (size_t)at * m, m, job->clearance) > 0;
+}
+
+/* Keeps those of the list that lie where they are wanted, in order. */
+static groom_status keep_lying(struct lying *job, const struct groom_context *context, struct groom_diag *diag)
+{
+    uint32_t n = 0;
+    for (uint32_t first = 0; first < job->n; first += CHUNK) {
+        uint32_t count = job->n - first < CHUNK ? job->n - first : CHUNK;
+        struct groom *some = NULL;
+        groom_status st = groom_select(job->groom, job->strand + first, count, context, &some, diag);
+        if (st == GROOM_OK)
+            st = groom_evaluate(some, 0, count, job->points, context, diag);
+        groom_destroy(some);
+        if (st != GROOM_OK)
+            return st;
+        parallel_for(context, count, look_piece, job);
+        for (uint32_t at = 0; at < count; at++)
+            if (job->is_in[at] == job->in)
+                job->strand[n++] = job->strand[first + at];
+    }
+    job->n = n;
+    return GROOM_OK;
+}
+
+static void list_unseen(struct lying *job)
+{
+    const struct groom_fit *fit = job->fit;
+    job->n = 0;
+    for (uint32_t i = 0, k = 0; i < fit->all.n; i++)
+        if (k < fit->n && fit->all.seen[k] == i)
+            k++;
+        else
+            job->strand[job->n++] = i;
+}
+
+/* Strands of the fit that lie out of the head, by where they are. */
+struct models { uint32_t n, *strand; float (*uv)[2]; struct groom_neighbours *index; };
+
+static groom_status models_init(struct models *models, const struct lying *job, const struct groom_context *context,
+                                struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    const struct groom_fit *fit = job->fit;
+    struct lying seen = *job;
+    *models = (struct models){.strand = memory_array(allocator, fit->n, sizeof *models->strand),
+                              .uv = memory_array(allocator, fit->n, sizeof *models->uv)};
+    if (!models->strand || !models->uv)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to look at %u strands", fit->n);
+    for (uint32_t k = 0; k < fit->n; k++)
+        models->strand[k] = k;
+    seen.groom = fit->groom;
+    seen.in = 0;
+    seen.n = fit->n;
+    seen.strand = models->strand;
+    groom_status st = keep_lying(&seen, context, diag);
+    models->n = st == GROOM_OK ? seen.n : 0;
+    for (uint32_t at = 0; at < models->n; at++)
+        memcpy(models->uv[at], fit->root_uv[models->strand[at]], sizeof *models->uv);
+    return models->n > 0 ? groom_neighbours_create(models->uv[0], models->n, 2, context, &models->index, diag) : st;
+}
+
+static void models_finish(struct models *models, const struct groom_fit *fit, const struct groom_allocator *allocator)
+{
+    groom_neighbours_destroy(models->index);
+    memory_release(allocator, models->strand, fit->n, sizeof *models->strand);
+    memory_release(allocator, models->uv, fit->n, sizeof *models->uv);
+}
+
+/* Each gets what the model has that is the rank-th nearest to it. uv, near: [n], [n * TRIES] scratch */
+static groom_status take_after(struct lying *job, const struct models *models, uint32_t rank, float (*uv)[2],
+                               uint32_t *near, const struct groom_context *context, struct groom_diag *diag)
+{
+    for (uint32_t at = 0; at < job->n; at++)
+        memcpy(uv[at], job->groom->root_uv[job->strand[at]], sizeof *uv);
+    groom_status st = groom_neighbours_find(models->index, uv[0], job->n, rank + 1, near, NULL, context, diag);
+    for (uint32_t at = 0; st == GROOM_OK && at < job->n; at++)
+        copy_strand(job->fit->groom, models->strand[near[(size_t)at * (rank + 1) + rank]], job->groom, job->strand[at]);
+    return st;
+}
+
+/* Nobody knows these strands: in place of the numbers drawn for them they get what the nearest strand has that is seen
+ * and keeps them out; where none of a few does, what the nearest one has. */
+static groom_status follow_models(struct lying *job, const struct models *models, const struct groom_context *context,
+                                  struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    uint32_t n = job->n, tries = models->n < TRIES ? models->n : TRIES;
+    float (*uv)[2] = memory_array(allocator, n, sizeof *uv);
+    uint32_t *near = memory_array(allocator, (size_t)n * TRIES, sizeof *near);
+    groom_status st = uv && near ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for %u strands in the head", n);
+    for (uint32_t rank = 0; st == GROOM_OK && rank < tries && job->n > 0; rank++)
+        if ((st = take_after(job, models, rank, uv, near, context, diag)) == GROOM_OK)
+            st = keep_lying(job, context, diag);
+    if (st == GROOM_OK && tries > 0 && job->n > 0)
+        st = take_after(job, models, 0, uv, near, context, diag);
+    memory_release(allocator, uv, n, sizeof *uv);
+    memory_release(allocator, near, (size_t)n * TRIES, sizeof *near);
+    return st;
+}
+
+static groom_status clear_listed(struct lying *job, const struct groom_context *context, struct groom_diag *diag)
+{
+    struct models models = {0};
+    groom_status st = keep_lying(job, context, diag);
+    if (st != GROOM_OK || job->n == 0)
+        return st;
+    if ((st = models_init(&models, job, context, diag)) == GROOM_OK)
+        st = follow_models(job, &models, context, diag);
+    models_finish(&models, job->fit, memory_allocator(context));
+    return st;
+}
+
+static groom_status clear_unseen(const struct groom_fit *fit, struct groom *groom, const struct groom_context *context,
+                                 struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    struct lying job = {.fit = fit, .groom = groom, .in = 1, .clearance = (float)DEEP * fit->ordinary};
+    size_t n_points = (size_t)CHUNK * groom->n_vertices;
+    groom_status st = GROOM_OK;
+    if (!fit->bvh)
+        return GROOM_OK;
+    job.strand = memory_array(allocator, fit->all.n, sizeof *job.strand);
+    job.points = memory_array(allocator, n_points, sizeof *job.points);
+    job.is_in = memory_array(allocator, CHUNK, 1);
+    if (!job.strand || !job.points || !job.is_in)
+        st = groom_fail(diag, GROOM_ENOMEM, "no memory to look for strands in the head");
+    if (st == GROOM_OK) {
+        list_unseen(&job);
+        st = clear_listed(&job, context, diag);
+    }
+    memory_release(allocator, job.strand, fit->all.n, sizeof *job.strand);
+    memory_release(allocator, job.points, n_points, sizeof *job.points);
+    memory_release(allocator, job.is_in, CHUNK, 1);
+    return st;
 }
 
 groom_status unseen_restore(const struct groom_fit *fit, const struct groom_context *context, struct groom **out,
@@ -204,6 +370,9 @@ groom_status unseen_restore(const struct groom_fit *fit, const struct groom_cont
     groom_status st = make_whole(fit, &groom, diag);
     if (st == GROOM_OK && (st = place_all(fit, groom, context, diag)) == GROOM_OK) {
         copy_seen(fit, groom);
+        st = clear_unseen(fit, groom, context, diag);
+    }
+    if (st == GROOM_OK) {
         *out = groom;
         groom = NULL;
     }

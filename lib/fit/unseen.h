@@ -13,7 +13,8 @@ GROOM_MUST_CHECK groom_status unseen_remove(struct groom_fit *fit, const unsigne
                                             struct groom_diag *diag);
 
 /* A groom of all strands: those that are seen as the fit has them, the others instanced by distance, with
- * the nearest operator guide that keeps them out of the head, and random numbers drawn from the seed.
+ * the nearest operator guide that keeps them out of the head, and random numbers drawn from the seed. What of these is in
+ * the head all the same gets what the nearest strand has that is seen and keeps it out, of 32 that are out themselves.
  * returns  GROOM_OK, GROOM_ENOMEM */
 GROOM_MUST_CHECK groom_status unseen_restore(const struct groom_fit *fit, const struct groom_context *context,
                                              struct groom **groom, struct groom_diag *diag);

@@ -214,6 +214,8 @@ struct groom_fit_report {
     uint32_t n_unseen;      /* that no camera sees enough of: left out of the stages */
     uint32_t n_reassigned;  /* moved to another operator guide, away from the head */
     uint32_t n_penetrating; /* for which no operator guide keeps them out of the head */
+    uint32_t n_in_head;     /* that stage randoms leaves in the head, by more than 1 mm of an ordinary one, ... */
+    uint32_t n_beyond_target; /* ... and those of them that are by as much deeper in it than their targets */
     uint32_t n_losses;
     struct groom_fit_loss losses[GROOM_FIT_MAX_LOSSES];
     uint32_t n_notes;
