@@ -24,6 +24,7 @@
 #include "fit/loss_guides.h"
 #include "fit/mean_strands.h"
 #include "fit/paper_guides.h"
+#include "fit/roughness.h"
 #include "fit/state.h"
 
 enum phase { SOLVE, ASSIGN, ENDED };
@@ -37,6 +38,7 @@ enum phase { SOLVE, ASSIGN, ENDED };
 #define CURLS_UNKNOWN (2.0 / 3) /* of the waves along a guide, while it could take those of curls for its own */
 #define ROOT_PART 6            /* of so many of a guide, where it turns out of the scalp */
 #define LOOSEST 0.001          /* of the usual weight along it, there */
+#define TIGHTEST 16.0          /* times the usual weight along it, where neighbours share nothing: two waves a guide, for three */
 #define FEW_STRANDS 8.0        /* of an operator guide tell little of where it stands */
 #define ROUNDS_AT_HEAD 2
 #define ROUNDS_KNOWN 1          /* of guides that were out of the head already */
@@ -55,6 +57,7 @@ struct solution {
     double (*shape)[3];     /* [n_guides * m] of the target's size, from the root; while solving rows 0: its move */
     double (*move)[3];      /* [n_guides] of the roots, then */
     double (*line)[3];      /* [m] */
+    struct roughness *roughness; /* [m] */
     double *partial;        /* of the loss */
     float (*direction)[3];  /* [n_guides] at the root, unit */
     float (*point)[3];      /* [n_guides * m] metres */
@@ -277,35 +280,39 @@ static double cycles_of(const struct groom_fit *fit, int known)
     return curls && !known ? CURLS_UNKNOWN * cycles : cycles;
 }
 
-/* How large third differences from vertex j on are, over all guides as they stand. */
-static double roughness_at(const struct solution *solution, uint32_t j)
-{
-    double sum = 0;
-    for (uint32_t g = 0; g < solution->fit->n_guides; g++) {
-        const double (*s)[3] = (const double (*)[3])(solution->shape + (size_t)g * solution->fit->m + j);
-        for (int c = 0; c < 3; c++)
-            sum += pow(s[3][c] - 3 * s[2][c] + 3 * s[1][c] - s[0][c], 2);
-    }
-    return sum;
-}
-
 /* Hair that is combed turns sharply out of the scalp and hardly at all farther on, which one weight for all of a guide
  * smooths away near the root. So third differences weigh there by how large they usually are, as if each were drawn from
- * a normal distribution of its place. Beyond the root's part all weigh the same: from there on, what is rough may as well
- * be what operators have left in the guides. */
+ * a normal distribution of its place. Beyond the root's part all weigh the same. */
 static void loosen_roots(struct solution *solution)
 {
     uint32_t m = solution->fit->m, part = m / ROOT_PART, last = m - 3;
     double usual = 0;
-    if (m <= 2 * ROOT_PART)
-        return;
     for (uint32_t j = part; j < last; j++)
-        usual += roughness_at(solution, j) / (last - part);
+        usual += solution->roughness[j].square / (last - part);
     for (uint32_t j = 0; j < part; j++) {
-        double here = roughness_at(solution, j);
+        double here = solution->roughness[j].square;
         if (here > usual)
             solution->system.along[j] *= fmax(usual / here, LOOSEST);
     }
+}
+
+/* What is rough and not shared with neighbours is what operators have left in guides: they would keep it from one round
+ * to the next, as the strands' numbers are looked for around it. */
+static void tighten(struct solution *solution)
+{
+    uint32_t m = solution->fit->m;
+    for (uint32_t j = 0; j + 3 < m; j++)
+        solution->system.along[j] /= fmax(roughness_share(solution->roughness, m, j), 1 / TIGHTEST);
+}
+
+static void weigh_roughness(struct solution *solution)
+{
+    uint32_t m = solution->fit->m;
+    if (m <= 2 * ROOT_PART)
+        return;
+    roughness_measure((const double (*)[3])solution->shape, m, &solution->laplacian, solution->roughness);
+    loosen_roots(solution);
+    tighten(solution);
 }
 
 static groom_status cancelled(struct groom_diag *diag)
@@ -395,11 +402,12 @@ static groom_status solution_init(struct solution *solution, struct groom_fit *f
     solution->shape = memory_array(allocator, size, sizeof *solution->shape);
     solution->move = memory_array_zero(allocator, fit->n_guides, sizeof *solution->move);
     solution->line = memory_array(allocator, fit->m, sizeof *solution->line);
+    solution->roughness = memory_array(allocator, fit->m, sizeof *solution->roughness);
     solution->partial = memory_array(allocator, mean_strands_pieces(fit->n), sizeof *solution->partial);
     solution->direction = memory_array(allocator, fit->n_guides, sizeof *solution->direction);
     solution->point = memory_array(allocator, size, sizeof *solution->point);
     solution->surface = memory_array(allocator, size, sizeof *solution->surface);
-    if (!solution->shape || !solution->move || !solution->line || !solution->partial || !solution->direction || !solution->point ||
+    if (!solution->shape || !solution->move || !solution->line || !solution->roughness || !solution->partial || !solution->direction || !solution->point ||
         !solution->surface)
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the shapes of %u guides", fit->n_guides);
     load_shapes(solution);
@@ -418,7 +426,7 @@ static groom_status solution_init(struct solution *solution, struct groom_fit *f
     st = guide_system_init(&solution->system, &solution->mean, &solution->laplacian, along_of(cycles, fit->m), across,
                            context, diag);
     if (st == GROOM_OK && known)
-        loosen_roots(solution);
+        weigh_roughness(solution);
     int clumps = solution->mean.n_parts > fit->groom->n_instancing;
     if (st == GROOM_OK && clumps)
         st = expect_roots(solution, known, context, diag);
@@ -436,6 +444,7 @@ static void solution_finish(struct solution *solution, const struct groom_contex
     memory_release(allocator, solution->shape, size, sizeof *solution->shape);
     memory_release(allocator, solution->move, fit->n_guides, sizeof *solution->move);
     memory_release(allocator, solution->line, fit->m, sizeof *solution->line);
+    memory_release(allocator, solution->roughness, fit->m, sizeof *solution->roughness);
     memory_release(allocator, solution->partial, mean_strands_pieces(fit->n), sizeof *solution->partial);
     memory_release(allocator, solution->direction, fit->n_guides, sizeof *solution->direction);
     memory_release(allocator, solution->point, size, sizeof *solution->point);

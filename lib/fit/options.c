@@ -106,7 +106,7 @@ const struct option_row options_table[] = {
     ROW(randoms, method, OPTION_METHOD, 0, 0, 0, 0, 1,
         "direct: values of each number's range are tried. paper: Adam on Eq. 19 with noise on its gradients (Eqs. 20, 21)."),
     ROW(randoms, rounds, OPTION_U32, 1, 2, 3, 0, 100,
-        "Rounds over the operators' random numbers. 0 leaves them as they were drawn."),
+        "Rounds over the operators' random numbers. 0 leaves them as they were drawn; from 2 on there is one more for curls of a few strands a guide."),
     ROW(randoms, values, OPTION_U32, 64, 80, 128, 2, 10000,
         "Values of a strand's number that are tried over its range before the best is refined."),
     ROW(randoms, strands, OPTION_U32, 8, 16, 64, 1, 100000,

@@ -37,6 +37,7 @@
 #define HALVINGS 3           /* of the step around the best value: Newton's steps do the rest */
 #define STEP_WORK 1200000    /* strands times values of one step: about a second */
 #define MOST_PASSES 256
+#define FEW_STRANDS 6        /* a guide */
 #define CANDIDATES 8         /* operator guides near a strand that it may follow */
 #define GAIN 0.3f            /* share of its error that another one must be better by */
 #define CURL_VALUES 256      /* about: values of a curl's numbers that are tried */
@@ -91,11 +92,27 @@ static uint32_t list_numbers(const struct groom *groom, uint32_t round, int per_
     return n;
 }
 
+static int winds(const struct groom *groom)
+{
+    int any = 0;
+    for (uint32_t o = 0; o < groom->n_operators; o++)
+        any |= groom->operators[o].type == GROOM_OPERATOR_CURL && has_effect(&groom->operators[o]);
+    return any;
+}
+
+/* Where few strands tell a guide, and these of one curl, it takes on what is wrong with their numbers, which are looked for
+ * around it: each round takes away but a part of that. There is one more then. */
+static uint32_t rounds_of(const struct groom_fit *fit)
+{
+    uint32_t rounds = fit->options.stages.randoms.rounds;
+    return rounds > 1 && winds(fit->groom) && fit->n < FEW_STRANDS * fit->n_guides ? rounds + 1 : rounds;
+}
+
 /* In a round: what strands share, then whom they follow in it, then what each has of its own; between rounds,
  * guides for these numbers, for those before were for any, and parameters for the guides. */
 static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST_PASSES])
 {
-    uint32_t n = 0, n_rounds = fit->options.stages.randoms.rounds;
+    uint32_t n = 0, n_rounds = rounds_of(fit);
     for (uint32_t round = 0; round < n_rounds && n + 4 * GROOM_FIT_MAX_OPERATORS + 6 <= MOST_PASSES; round++) {
         uint32_t n_curls = list_numbers(fit->groom, round, 1, passes + n), begin = n;
         n += n_curls;
@@ -294,7 +311,7 @@ static uint32_t step_size(const struct groom_fit *fit, const struct pass *pass)
 
 static int is_last(const struct groom_fit *fit, const struct pass *pass)
 {
-    return pass->round + 1 == fit->options.stages.randoms.rounds;
+    return pass->round + 1 == rounds_of(fit);
 }
 
 static groom_status clear_head(struct groom_fit *fit, struct random_search *search, uint32_t count,

@@ -6,6 +6,7 @@
 #include "fit/guide_laplacian.h"
 #include "fit/guide_system.h"
 #include "fit/mean_strands.h"
+#include "fit/roughness.h"
 #include "groom/random.h"
 #include "tests/support/guides.h"
 #include "tests/support/test.h"
@@ -168,6 +169,32 @@ START_TEST(equal_guides_cost_nothing_and_even_change_next_to_nothing)
         ck_assert_double_lt(fabs(row_of(&l, g, same)), 1e-12);
         ck_assert_double_lt(fabs(row_of(&l, g, slope)), 0.12); /* neighbours differ by 0.33 */
     }
+    sparse_finish(&l);
+}
+END_TEST
+
+/* What shares of their roughness guides have in common that all wind alike, or of which each winds in a way of its own. */
+static double share_of(const struct sparse *l, int alike)
+{
+    double (*shape)[3] = calloc((size_t)SIDE * SIDE * VERTICES, sizeof *shape);
+    struct roughness roughness[VERTICES];
+    for (uint32_t g = 0; g < SIDE * SIDE; g++)
+        for (uint32_t j = 0; j < VERTICES; j++)
+            for (uint32_t c = 0; c < 3; c++)
+                shape[g * VERTICES + j][c] = sin(j + c + (alike ? 0 : 6.28 * groom_random_uniform((struct groom_random_key){1, 1}, g, c)));
+    roughness_measure((const double (*)[3])shape, VERTICES, l, roughness);
+    free(shape);
+    return roughness_share(roughness, VERTICES, VERTICES / 2);
+}
+
+START_TEST(guides_share_the_roughness_that_their_neighbours_have)
+{
+    float uv[SIDE * SIDE][2], direction[SIDE * SIDE][3];
+    struct sparse l = {0};
+    grid_of(uv, direction, 0);
+    ck_ok(guide_laplacian((const float (*)[2])uv, (const float (*)[3])direction, SIDE * SIDE, 0.3, &l, NULL, NULL));
+    ck_assert_double_gt(share_of(&l, 1), 0.999);
+    ck_assert_double_lt(share_of(&l, 0), 0.2);
     sparse_finish(&l);
 }
 END_TEST
@@ -385,6 +412,7 @@ int main(void)
     tcase_add_loop_test(parts, the_system_is_the_gradient_of_the_loss, 0, 2);
     tcase_add_test(parts, equal_guides_cost_nothing_and_even_change_next_to_nothing);
     tcase_add_test(parts, the_sides_of_a_parting_leave_each_other_alone);
+    tcase_add_test(parts, guides_share_the_roughness_that_their_neighbours_have);
     tcase_add_test(parts, few_guides_and_guides_of_one_root_have_neighbours);
     tcase_add_test(parts, the_matrix_is_symmetric_and_positive);
     tcase_add_test(parts, the_solution_is_the_minimum);

@@ -379,6 +379,33 @@ START_TEST(no_rounds_leave_the_numbers_as_they_were_drawn)
 }
 END_TEST
 
+static void count_round(void *user, const char *name, uint64_t iteration, double value)
+{
+    uint64_t *rounds = user;
+    (void)name, (void)value;
+    *rounds = iteration > *rounds ? iteration : *rounds;
+}
+
+static uint64_t rounds_of(groom_sample_style style)
+{
+    struct groom_sample *sample = guides_sample(style, 200, M, 3, NULL);
+    struct groom_fit *fit = fit_of(sample, 2);
+    uint64_t rounds = 0;
+    struct groom_progress progress = {.user = &rounds, .loss = count_round};
+    struct groom_context context = {.progress = &progress};
+    finish(fit, &context);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+    return rounds;
+}
+
+START_TEST(curls_of_a_few_strands_a_guide_take_another_round)
+{
+    ck_assert_uint_eq(rounds_of(GROOM_SAMPLE_COILY), 3); /* two strands a guide */
+    ck_assert_uint_eq(rounds_of(GROOM_SAMPLE_SHORT), 2);
+}
+END_TEST
+
 /* --- the paper's method --------------------------------------------------------------------- */
 
 /* Eq. 19's gradient is what differences say it is. */
@@ -476,6 +503,6 @@ TEST_SUITE("fit_randoms", the_error_is_none_on_the_same_curve_however_its_vertic
            guides_of_straight_hair_follow_known_numbers, guides_of_wavy_hair_follow_known_numbers,
            what_scales_have_in_common_goes_to_the_guides, frequencies_that_are_found_tell_their_law,
            what_halves_of_the_strands_do_not_agree_on_is_no_difference_of_curls, the_stage_has_the_same_bits_for_any_threads, the_stage_can_be_interrupted_anywhere,
-           a_step_without_memory_changes_nothing, no_rounds_leave_the_numbers_as_they_were_drawn,
+           a_step_without_memory_changes_nothing, no_rounds_leave_the_numbers_as_they_were_drawn, curls_of_a_few_strands_a_guide_take_another_round,
            the_papers_gradient_is_that_of_its_loss, the_papers_steps_go_down,
            the_papers_steps_can_be_interrupted_and_know_no_threads, the_papers_steps_without_memory_change_nothing)

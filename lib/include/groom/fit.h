@@ -104,7 +104,7 @@ struct groom_fit_options {
         } operators;
         struct {
             groom_fit_method method;
-            uint32_t rounds;            /* over the chain; 0 leaves the numbers as they were drawn */
+            uint32_t rounds;            /* over the chain; from 2 on, one more for curls of few strands a guide; 0: as drawn */
             uint32_t values;            /* of a strand's number that are tried over its range */
             uint32_t strands;           /* of an operator guide that are asked about its curl */
             double lambda_x;            /* of vertices over directions: 3 */
