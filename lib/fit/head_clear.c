@@ -14,8 +14,10 @@
 #define LEFT 0.001       /* that are told of */
 #define STIFF 10.0f      /* times what depth costs while numbers are looked for */
 #define GAIN 0.3f        /* share of its error that another operator guide must be better by */
-#define NEAR 96          /* operator guides, and guides, around a strand that it gets first, */
-#define AFAR 500         /* and guides where it stays in with these */
+#define NEAR_OPERATORS 32 /* operator guides around a strand that it may follow first, */
+#define NEAR 96          /* and guides; */
+#define AFAR_OPERATORS 96 /* the same where it stays in with these */
+#define AFAR 200
 #define TRIES 16         /* with other guides; in each, depth costs twice what it did in the one before */
 #define CHUNK 4000       /* strands that are looked at together */
 #define STRANDS_PER_PIECE 16
@@ -182,13 +184,13 @@ static void near_finish(struct near *near, const struct groom_allocator *allocat
 }
 
 /* Other operator guides, where their curl or clump is what draws strands in. */
-static groom_status choose_operator_guides(struct random_search *search, uint32_t n, const struct groom_context *context,
+static groom_status choose_operator_guides(struct random_search *search, uint32_t n, uint32_t n_near, const struct groom_context *context,
                                            struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     const struct groom *groom = search->fit->groom;
     struct near near;
-    groom_status st = near_init(&near, search, n, lesser(NEAR, groom->n_operator_guides), allocator, diag);
+    groom_status st = near_init(&near, search, n, lesser(n_near, groom->n_operator_guides), allocator, diag);
     if (st == GROOM_OK &&
         (st = follow_candidates(groom, (const float (*)[2])near.uv, n, near.k, near.candidate, context, diag)) == GROOM_OK)
         random_search_guides(search, 0, n, near.candidate, near.k, GAIN, context);
@@ -247,7 +249,7 @@ static struct way way_at(uint32_t k)
 static groom_status blend_anew(struct random_search *search, uint32_t n, uint32_t n_tries,
                                const struct groom_context *context, struct groom_diag *diag)
 {
-    groom_status st = choose_operator_guides(search, n, context, diag);
+    groom_status st = choose_operator_guides(search, n, n_tries == 0 ? NEAR_OPERATORS : AFAR_OPERATORS, context, diag);
     if (st == GROOM_OK)
         st = choose_guides(search, n, n_tries == 0 ? NEAR : AFAR, n_tries, context, diag);
     if (st == GROOM_OK)

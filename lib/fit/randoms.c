@@ -37,7 +37,8 @@
 #define HALVINGS 3           /* of the step around the best value: Newton's steps do the rest */
 #define STEP_WORK 1200000    /* strands times values of one step: about a second */
 #define MOST_PASSES 256
-#define FEW_STRANDS 6        /* a guide */
+#define FEW_STRANDS 6        /* a guide: another round for curls; */
+#define SOME_STRANDS 16      /* another look at guides and curls */
 #define CANDIDATES 8         /* operator guides near a strand that it may follow */
 #define GAIN 0.3f            /* share of its error that another one must be better by */
 #define CURL_VALUES 256      /* about: values of a curl's numbers that are tried */
@@ -101,7 +102,8 @@ static int winds(const struct groom *groom)
 }
 
 /* Where few strands tell a guide, and these of one curl, it takes on what is wrong with their numbers, which are looked for
- * around it: each round takes away but a part of that. There is one more then. */
+ * around it: each round takes away but a part of that. There is one more then; and where they are not quite as few, guides
+ * and curls are asked of each other once more in a round. */
 static uint32_t rounds_of(const struct groom_fit *fit)
 {
     uint32_t rounds = fit->options.stages.randoms.rounds;
@@ -116,7 +118,7 @@ static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST
     for (uint32_t round = 0; round < n_rounds && n + 4 * GROOM_FIT_MAX_OPERATORS + 6 <= MOST_PASSES; round++) {
         uint32_t n_curls = list_numbers(fit->groom, round, 1, passes + n), begin = n;
         n += n_curls;
-        if (round > 0 && n_curls > 0) { /* guides and curls hold of each other: what is one's comes back to it step by step */
+        if (round > 0 && n_curls > 0 && fit->n < SOME_STRANDS * fit->n_guides) {
             passes[n++] = (struct pass){.kind = GUIDES, .round = round};
             n += list_numbers(fit->groom, round, 1, passes + n);
         }

@@ -217,8 +217,8 @@ START_TEST(strands_that_were_left_out_get_the_hair_around_them)
 }
 END_TEST
 
-/* As they are drawn, 137 of 565 lie in the head; a few are left, in the middle of strands of which no neighbour's way
- * leads out from their roots. */
+/* As they are drawn, 137 of 565 lie in the head; about a tenth of those are left, in the middle of strands of which no
+ * neighbour's way leads out from their roots. */
 START_TEST(strands_that_were_left_out_stay_out_of_the_head)
 {
     struct groom_sample *sample = junk_inside();
@@ -234,7 +234,7 @@ START_TEST(strands_that_were_left_out_stay_out_of_the_head)
             n_in += assign_buried(fit->bvh, (const float (*)[3])x, 60, 0.001f) > 0;
         }
     ck_assert_uint_lt(k, groom->n_strands);
-    ck_assert_uint_le(n_in, 12);
+    ck_assert_uint_le(n_in, 20);
     groom_destroy(groom);
     groom_fit_destroy(fit);
     groom_sample_destroy(sample);
