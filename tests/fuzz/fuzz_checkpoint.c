@@ -1,5 +1,6 @@
-/* Whatever a checkpoint says, a fit refuses it or goes on from it to its end. The input is the
- * payload; its header and checksums are made right here, so that the fuzzer gets past them. */
+/* Whatever a checkpoint says, a fit refuses it or goes on from it to its end. The input says after how many steps a
+ * checkpoint is taken, and what is then changed in its payload: so it stays one as the format moves on. Header and checksum
+ * are made anew, so that the fuzzer gets past them. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -59,10 +60,63 @@ static groom_status load(struct groom_fit *fit, const uint8_t *payload, size_t n
     return st;
 }
 
-int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_bytes)
+/* --- checkpoints to be changed ---------------------------------------------------------------- */
+
+#define MOST_BYTES (1u << 18)
+
+struct saved { uint8_t bytes[MOST_BYTES]; size_t n; };
+
+static groom_status append(void *user, const void *bytes, size_t n)
+{
+    struct saved *saved = user;
+    if (n > MOST_BYTES - saved->n)
+        return GROOM_ENOMEM;
+    memcpy(saved->bytes + saved->n, bytes, n);
+    saved->n += n;
+    return GROOM_OK;
+}
+
+/* The payload of a checkpoint after so many steps, or of the last one. */
+static void take_payload(uint32_t n_steps, struct saved *payload)
 {
     struct groom_fit *fit = small_fit();
-    if (n_bytes < 1u << 20 && load(fit, bytes, n_bytes) == GROOM_OK)
+    struct groom_sink sink = {append, payload};
+    payload->n = 0;
+    for (uint32_t k = 0; k < n_steps && !groom_fit_done(fit); k++)
+        if (groom_fit_step(fit, NULL, NULL) != GROOM_OK)
+            abort();
+    if (groom_fit_save(fit, sink, NULL) != GROOM_OK || payload->n < sizeof(struct checkpoint_header) + sizeof(uint64_t))
+        abort();
+    payload->n -= sizeof(struct checkpoint_header) + sizeof(uint64_t);
+    memmove(payload->bytes, payload->bytes + sizeof(struct checkpoint_header), payload->n);
+    groom_fit_destroy(fit);
+}
+
+#define CHANGE_BYTES 4 /* where, two bytes; how; with what */
+
+/* One byte, a word of it, a bit of it, or the end there. */
+static void change(struct saved *payload, const uint8_t how[CHANGE_BYTES])
+{
+    size_t at = ((size_t)how[0] | (size_t)how[1] << 8) % (payload->n + 1), left = payload->n - at;
+    switch (how[2] % 4) {
+    case 0: memset(payload->bytes + at, how[3], left < 1 ? left : 1); break;
+    case 1: memset(payload->bytes + at, how[3], left < 4 ? left : 4); break;
+    case 2:
+        if (left > 0)
+            payload->bytes[at] ^= (uint8_t)(1u << how[3] % 8);
+        break;
+    case 3: payload->n = at; break;
+    }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_bytes)
+{
+    static struct saved payload;
+    struct groom_fit *fit = small_fit();
+    take_payload(n_bytes > 0 ? bytes[0] : 0, &payload);
+    for (size_t k = 1; k + CHANGE_BYTES <= n_bytes; k += CHANGE_BYTES)
+        change(&payload, bytes + k);
+    if (n_bytes < 1u << 20 && load(fit, payload.bytes, payload.n) == GROOM_OK)
         while (!groom_fit_done(fit) && groom_fit_step(fit, NULL, NULL) == GROOM_OK)
             continue;
     struct groom *groom;
