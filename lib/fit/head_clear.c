@@ -7,11 +7,11 @@
 #include "base/parallel.h"
 #include "fit/follow.h"
 #include "fit/gather.h"
+#include "fit/head_planes.h"
 #include "geometry/side.h"
 #include "groom/spatial.h"
 
-#define DEEP 0.0005      /* metres in the head of ordinary size that are too deep */
-#define LEFT 0.001       /* that are told of */
+#define LEFT 0.001       /* metres in the head of ordinary size that are told of */
 #define STIFF 10.0f      /* times what depth costs while numbers are looked for */
 #define GAIN 0.3f        /* share of its error that another operator guide must be better by */
 #define NEAR_OPERATORS 32 /* operator guides around a strand that it may follow first, */
@@ -363,7 +363,7 @@ groom_status head_clear(struct random_search *search, uint32_t first, uint32_t c
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     uint32_t size = lesser(count, CHUNK), m = search->fit->m;
-    struct clearing job = {.search = search, .deep = (float)DEEP * search->fit->ordinary,
+    struct clearing job = {.search = search, .deep = (float)HEAD_TOO_DEEP * search->fit->ordinary,
                            .price = STIFF * search->weights.depth};
     struct head_left found = {.depth = (float)LEFT * search->fit->ordinary};
     struct kept whole;

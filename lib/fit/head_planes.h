@@ -30,5 +30,7 @@ GROOM_MUST_CHECK groom_status head_planes_create(struct groom_fit *fit, const st
 
 /* Metres outside the head, on an ordinary head, from which on it is far off. */
 #define HEAD_REACH 0.01
+/* Metres in such a head that are too deep for a strand to stay there. */
+#define HEAD_TOO_DEEP 0.0005
 
 #endif

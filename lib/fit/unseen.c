@@ -5,9 +5,9 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "fit/assign.h"
+#include "fit/head_planes.h"
 #include "fit/visibility.h"
 
-#define DEEP 0.0005 /* metres in the head of ordinary size that are too deep */
 #define TRIES 32    /* strands around one in the head that it may be like */
 #define CHUNK 4000  /* strands that are looked at together */
 
@@ -343,7 +343,7 @@ static groom_status clear_unseen(const struct groom_fit *fit, struct groom *groo
                                  struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
-    struct lying job = {.fit = fit, .groom = groom, .in = 1, .clearance = (float)DEEP * fit->ordinary};
+    struct lying job = {.fit = fit, .groom = groom, .in = 1, .clearance = (float)HEAD_TOO_DEEP * fit->ordinary};
     size_t n_points = (size_t)CHUNK * groom->n_vertices;
     groom_status st = GROOM_OK;
     if (!fit->bvh)
