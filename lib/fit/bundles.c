@@ -6,6 +6,7 @@
 
 #include "base/memory.h"
 #include "fit/likeness.h"
+#include "fit/sites.h"
 
 struct bundling {
     struct groom_fit *fit;
@@ -121,27 +122,6 @@ static void write_assignment(struct bundling *b, const uint32_t *guide, uint32_t
 
 /* --- where they stand ------------------------------------------------------------------------- */
 
-void bundles_places(const struct groom_fit *fit, struct bundle_place *place)
-{
-    const struct groom *groom = fit->groom;
-    memset(place, 0, groom->n_operator_guides * sizeof *place);
-    for (uint32_t i = 0; i < fit->n; i++) {
-        place[groom->operator_guide_of[i]].n++;
-        for (int c = 0; c < 3; c++)
-            place[groom->operator_guide_of[i]].middle[c] += (double)fit->roots[i][c];
-    }
-    for (uint32_t o = 0; o < groom->n_operator_guides; o++) {
-        const float *root = groom->guides[(size_t)groom->operator_guide[o] * fit->m];
-        struct groom_surface_point surface;
-        float middle[3];
-        for (int c = 0; c < 3; c++)
-            middle[c] = place[o].n > 0 ? (float)(place[o].middle[c] / place[o].n) : root[c];
-        int on_head = fit->bvh && groom_bvh_closest(fit->bvh, middle, INFINITY, &surface);
-        for (int c = 0; c < 3; c++)
-            place[o].middle[c] = (double)(on_head ? surface.position[c] : middle[c]);
-    }
-}
-
 struct nearest { double square; uint32_t strand; };
 
 /* Where the file brought the scalp coordinates, no chart tells those of a new place: they are those of the
@@ -199,12 +179,13 @@ static void move_root(struct groom_fit *fit, uint32_t guide, const double to[3])
     }
 }
 
-/* Operator guides to the middles of their strands. */
-static void centre(struct groom_fit *fit, struct bundle_place *place, struct nearest *nearest, const struct groom_context *context)
+/* guide [n_gop] of each region */
+static void move_to_sites(struct groom_fit *fit, const uint32_t *guide, const struct site *site, struct nearest *nearest,
+                          const struct groom_context *context)
 {
-    bundles_places(fit, place);
-    for (uint32_t o = 0; o < fit->groom->n_operator_guides; o++)
-        move_root(fit, fit->groom->operator_guide[o], place[o].middle);
+    for (uint32_t k = 0; k < fit->groom->n_operator_guides; k++)
+        if (site[k].n > 0)
+            move_root(fit, guide[k], site[k].at);
     find_coordinates(fit, nearest, context);
 }
 
@@ -225,9 +206,9 @@ static groom_status find(struct bundling *b, const struct groom_context *context
     size_t n_shape = (size_t)n_op * b->fit->m;
     uint32_t *guide = memory_array(allocator, n_op, 2 * sizeof *guide);
     float (*shape)[3] = memory_array(allocator, n_shape, sizeof *shape);
-    struct bundle_place *place = memory_array(allocator, n_op, sizeof *place);
+    struct site *site = memory_array(allocator, n_op, sizeof *site);
     struct nearest *nearest = memory_array(allocator, n_op, sizeof *nearest);
-    groom_status st = guide && shape && place && nearest ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to name operator guides");
+    groom_status st = guide && shape && site && nearest ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to name operator guides");
     if (st != GROOM_OK || (st = likeness_init(&b->likeness, b->fit, winds(b->fit), context, diag)) != GROOM_OK)
         goto out;
     if ((st = regions_merge(b->likeness.edge, (size_t)n * LIKENESS_NEIGHBOURS, n, n_op, b->region, allocator)) != GROOM_OK) {
@@ -239,13 +220,15 @@ static groom_status find(struct bundling *b, const struct groom_context *context
         groom_fail(diag, st, "no memory to name %u operator guides", n_op);
         goto out;
     }
+    if ((st = sites_find(b->fit, b->region, n_op, site, context, diag)) != GROOM_OK)
+        goto out;
     shape_guides(b, guide, shape);
     write_assignment(b, guide, guide + n_op);
-    centre(b->fit, place, nearest, context);
+    move_to_sites(b->fit, guide, site, nearest, context);
 out:
     memory_release(allocator, guide, n_op, 2 * sizeof *guide);
     memory_release(allocator, shape, n_shape, sizeof *shape);
-    memory_release(allocator, place, n_op, sizeof *place);
+    memory_release(allocator, site, n_op, sizeof *site);
     memory_release(allocator, nearest, n_op, sizeof *nearest);
     return st;
 }

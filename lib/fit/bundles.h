@@ -8,20 +8,14 @@
  * which do. Within a bundle neighbours are much more alike (fit/likeness.h) than across its border, even where its
  * far ends are not: strands are merged across borders of least difference (fit/regions.h) until there are as many
  * bundles as operator guides. The guide nearest to the middle of a bundle becomes its operator guide, and is moved
- * there with the shape that guides have around: strands close in on it from where they stand, so that a root
- * elsewhere would bend it by as much. Stage guides looks for a better place around it.
+ * to where it stands likeliest (fit/sites.h) with the shape that guides have around: strands close in on it from where
+ * they stand, so that a root elsewhere would bend it by as much. Stage guides looks for a better place around it.
  *
  * Fills operator_guide and operator_guide_of of the fit's groom, and moves those guides and their centroids.
  * returns  GROOM_OK, GROOM_ENOMEM
  * threads  same bits for any pool */
 GROOM_MUST_CHECK groom_status bundles_find(struct groom_fit *fit, const struct groom_context *context,
                                            struct groom_diag *diag);
-
-/* Of the strands that follow an operator guide: how many, and the point of the head next to the middle of their roots. */
-struct bundle_place { double middle[3], n; }; /* metres */
-
-/* place [n_gop]; an operator guide that nothing follows: where it stands */
-void bundles_places(const struct groom_fit *fit, struct bundle_place *place);
 
 /* Finds the scalp coordinates of operator guides that were moved.
  * returns  GROOM_OK, GROOM_ENOMEM: nothing has changed */

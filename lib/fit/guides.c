@@ -25,6 +25,7 @@
 #include "fit/mean_strands.h"
 #include "fit/paper_guides.h"
 #include "fit/roughness.h"
+#include "fit/sites.h"
 #include "fit/state.h"
 
 enum phase { SOLVE, ASSIGN, ENDED };
@@ -42,8 +43,9 @@ enum phase { SOLVE, ASSIGN, ENDED };
 #define FEW_STRANDS 8.0        /* of an operator guide tell little of where it stands */
 #define ROUNDS_AT_HEAD 2
 #define ROUNDS_KNOWN 1          /* of guides that were out of the head already */
-#define HOLD_ROOT_EXPECTED 0.1 /* of an operator guide in the middle of its strands, over the weight of their vertices; */
-#define HOLD_ROOT_KNOWN 0.03   /* where it is, where random numbers are known, and scatter less */
+#define HOLD_ROOT_EXPECTED 0.1 /* of an operator guide at its likeliest place, over the weight of its strands' vertices; */
+#define HOLD_ROOT_KNOWN 0.03   /* where it was found so far, where random numbers are known, and scatter less; */
+#define HOLD_ROOT_THERE 0.01   /* then, at its likeliest place */
 #define HOLD 1.0      /* of a vertex at the head, over the weight of a guide's strands */
 #define ASKED 8       /* strands of a guide that are asked whether they are in the head */
 #define FARTHEST 100.0 /* vertex from its root, over the size of the hair */
@@ -139,25 +141,27 @@ static void even_out(double (*shape)[3], double (*line)[3], uint32_t m)
 
 /* --- where operator guides stand -------------------------------------------------------------------- */
 
-/* Strands close in on their operator guide: where it stands shows in how. It is looked for around the middle of its
- * strands, the farther from there the less likely; where random numbers are known around where it was found so far. */
+/* Strands close in on their operator guide: where it stands shows in how. It is looked for around the place that who
+ * follows it tells (fit/sites.h), the farther from there the less likely; where random numbers are known between that and
+ * where it was found so far. */
 static groom_status expect_roots(struct solution *solution, int known, const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_fit *fit = solution->fit;
     const struct groom_allocator *allocator = memory_allocator(context);
-    struct bundle_place *place = memory_array(allocator, fit->groom->n_operator_guides, sizeof *place);
-    if (!place)
+    struct site *site = memory_array(allocator, fit->groom->n_operator_guides, sizeof *site);
+    if (!site)
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the places of %u operator guides", fit->groom->n_operator_guides);
-    bundles_places(fit, place);
-    for (uint32_t o = 0; o < fit->groom->n_operator_guides; o++) {
+    groom_status st = sites_find(fit, fit->groom->operator_guide_of, fit->groom->n_operator_guides, site, context, diag);
+    for (uint32_t o = 0; st == GROOM_OK && o < fit->groom->n_operator_guides; o++) {
         size_t root = (size_t)fit->groom->operator_guide[o] * fit->m;
-        double weight = (known ? HOLD_ROOT_KNOWN : HOLD_ROOT_EXPECTED) * (place[o].n + FEW_STRANDS) * fit->m;
-        solution->system.hold[root] = weight;
-        for (int c = 0; !known && c < 3; c++)
-            solution->system.pull[root][c] += weight * (place[o].middle[c] - fit->groom->guides[root][c]) / fit->scale;
+        double all = (site[o].n + FEW_STRANDS) * fit->m;
+        double here = known ? HOLD_ROOT_KNOWN * all : 0, there = (known ? HOLD_ROOT_THERE : HOLD_ROOT_EXPECTED) * all;
+        solution->system.hold[root] = here + there;
+        for (int c = 0; site[o].n > 0 && c < 3; c++)
+            solution->system.pull[root][c] += there * (site[o].at[c] - (double)fit->groom->guides[root][c]) / (double)fit->scale;
     }
-    memory_release(allocator, place, fit->groom->n_operator_guides, sizeof *place);
-    return GROOM_OK;
+    memory_release(allocator, site, fit->groom->n_operator_guides, sizeof *site);
+    return st;
 }
 
 /* Moves of roots out of the shapes, which begin at 0 then; and back. */

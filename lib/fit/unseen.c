@@ -8,7 +8,7 @@
 #include "fit/head_planes.h"
 #include "fit/visibility.h"
 
-#define TRIES 32    /* strands around one in the head that it may be like */
+#define TRIES 200    /* strands around one in the head that it may be like */
 #define CHUNK 4000  /* strands that are looked at together */
 
 /* --- out of the target ---------------------------------------------------------------------- */

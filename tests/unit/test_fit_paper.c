@@ -199,7 +199,7 @@ START_TEST(steps_go_down)
     struct groom_sample *sample = guides_sample(GROOM_SAMPLE_CURLY, 200, M, 3, NULL);
     struct groom_fit_options options = paper_options(sample);
     options.stages.guides.iterations = 200;
-    options.stages.operators.iterations = 120; /* Adam's first steps overshoot */
+    options.stages.operators.iterations = 160; /* Adam's first steps overshoot */
     struct groom_fit *fit = guides_fit(sample, &options, "", NULL);
     const struct groom_fit_loss *weights = fits_loss(fit, "instance_weights", "L_x"), *guides = fits_loss(fit, "guides", "L_g");
     const struct groom_fit_loss *shape = fits_loss(fit, "operators", "shape");
