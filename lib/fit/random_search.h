@@ -45,8 +45,8 @@ void random_search_strands(struct random_search *search, uint32_t active, uint32
  * whole    whether the whole range is looked at, or the surroundings of what there is
  * scale    an active operator before the curl that scales strands, or UINT32_MAX. What a strand is long and
  *          how often it winds are known together only: of the whole range, strands are given the lengths
- *          of their targets for each frequency; else frequency and scale are moved against each other, such
- *          that strands keep their turns, and the scale's numbers are written, too */
+ *          of their targets for each frequency; else frequency, phase and the common length of a guide's strands
+ *          take Newton's steps together, and the scale's numbers are written, too */
 struct random_search_groups {
     const uint32_t *member, *begin;
     uint32_t n_strands;

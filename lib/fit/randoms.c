@@ -26,6 +26,7 @@
 #include "fit/gather.h"
 #include "fit/guides.h"
 #include "fit/head_clear.h"
+#include "fit/lengths.h"
 #include "fit/loss_strands.h"
 #include "fit/operators.h"
 #include "fit/paper_randoms.h"
@@ -36,28 +37,31 @@
 #define SMOOTH_VALUES 24     /* of a number that the error is smooth in */
 #define HALVINGS 3           /* of the step around the best value: Newton's steps do the rest */
 #define STEP_WORK 1200000    /* strands times values of one step: about a second */
-#define MOST_PASSES 256
+#define PASSES_OF_ROUND (9 * GROOM_FIT_MAX_OPERATORS + 7) /* at most */
+#define MOST_PASSES (4 * PASSES_OF_ROUND)
 #define FEW_STRANDS 6        /* a guide: another round for curls; */
 #define SOME_STRANDS 16      /* another look at guides and curls */
 #define CANDIDATES 8         /* operator guides near a strand that it may follow */
 #define GAIN 0.3f            /* share of its error that another one must be better by */
 #define CURL_VALUES 256      /* about: values of a curl's numbers that are tried */
 #define DEPTH 10.0           /* what depth in the head costs, over distance */
-#define POLISH_STEPS 2       /* in the last round; 1 in others */
+#define POLISH_STEPS 3       /* at the end; 1 before */
 #define CLEAR_VALUES 100     /* about: as many evaluations as a look for what is in the head costs */
 #define POLISH_VALUES 48     /* about: evaluations of them */
 
 /* --- the row of passes ------------------------------------------------------------------------- */
 
 /* What is looked for: which operator guide each strand follows, the numbers of strands in one operator,
- * those of operator guides, the law that these follow, the last digits of all that a strand has, what these tell of
- * how long guides are, the guides that go with them, or these and the operators' parameters for them; at the end, how
+ * those of operator guides, what the strands of these are long, the law that these follow, the last digits of all that a
+ * strand has, what these tell of how long guides are, the guides that go with them, or these and the operators' parameters for them; at the end, how
  * strong frizz is for all that was found, and what is in the head. */
 struct pass {
-    enum { FOLLOW, STRANDS, CURLS, LAW, POLISH, CENTRE, GUIDES, RESHAPE, CALIBRATE, CLEAR } kind;
+    enum { FOLLOW, STRANDS, CURLS, LENGTHS, LAW, POLISH, CENTRE, GUIDES, RESHAPE, CALIBRATE, CLEAR } kind;
     uint32_t round;
-    uint32_t op, active; /* of STRANDS, CURLS and LAW: its index in the chain, and among those that are enabled */
-    int wide;            /* of CURLS and LAW: a look at more frequencies than there may be, for the law to begin with */
+    uint32_t op, active; /* of STRANDS, CURLS, LENGTHS and LAW: its index in the chain, and among those that are enabled */
+    enum { AROUND, WHOLE, BEYOND } look; /* of CURLS and LAW: around what was found, at the whole range, or at more
+                                          * frequencies than there may be, for the law to begin with */
+    int last; /* of POLISH: nothing is found after it */
 };
 
 static int has_effect(const struct groom_operator *op)
@@ -73,22 +77,61 @@ static int clumps(const struct groom *groom)
     return any && groom->n_operator_guides > 1;
 }
 
-static uint32_t list_numbers(const struct groom *groom, uint32_t round, int per_guide, struct pass *passes)
+static int draws(const struct groom_operator *op, int per_guide)
+{
+    return has_effect(op) && groom_operator_random_arrays(op->type) > 0 && groom_operator_random_per_guide(op->type) == per_guide;
+}
+
+/* The index of the scale that stands last before an operator, or UINT32_MAX. */
+static uint32_t scale_before(const struct groom *groom, uint32_t op)
+{
+    uint32_t found = UINT32_MAX;
+    for (uint32_t o = 0; o < op; o++)
+        if (groom->operators[o].type == GROOM_OPERATOR_SCALE && has_effect(&groom->operators[o]))
+            found = o;
+    return found;
+}
+
+/* The numbers of one curl, and what they tell. */
+static uint32_t list_curl(const struct groom *groom, const struct pass *look, struct pass *passes)
+{
+    uint32_t n = 0;
+    passes[n] = *look;
+    passes[n++].kind = CURLS;
+    if (look->look == AROUND && scale_before(groom, look->op) != UINT32_MAX) {
+        passes[n] = *look;
+        passes[n++].kind = LENGTHS;
+    }
+    if (frequencies_tell(groom)) {
+        passes[n] = *look;
+        passes[n++].kind = LAW;
+    }
+    return n;
+}
+
+static uint32_t list_curls(const struct groom *groom, uint32_t round, int again, struct pass *passes)
 {
     uint32_t n = 0, active = 0;
     for (uint32_t o = 0; o < groom->n_operators; o++) {
-        const struct groom_operator *op = &groom->operators[o];
-        if (has_effect(op) && groom_operator_random_arrays(op->type) > 0 &&
-            groom_operator_random_per_guide(op->type) == per_guide) {
-            if (per_guide && round == 0 && frequencies_tell(groom)) {
-                passes[n++] = (struct pass){CURLS, round, o, active, 1};
-                passes[n++] = (struct pass){LAW, round, o, active, 1};
-            }
-            passes[n++] = (struct pass){per_guide ? CURLS : STRANDS, round, o, active, 0};
-            if (per_guide && frequencies_tell(groom))
-                passes[n++] = (struct pass){LAW, round, o, active, 0};
-        }
-        active += op->enabled != 0;
+        struct pass look = {.round = round, .op = o, .active = active, .look = BEYOND};
+        active += groom->operators[o].enabled != 0;
+        if (!draws(&groom->operators[o], 1))
+            continue;
+        if (!again && frequencies_tell(groom))
+            n += list_curl(groom, &look, passes + n);
+        look.look = again ? AROUND : WHOLE;
+        n += list_curl(groom, &look, passes + n);
+    }
+    return n;
+}
+
+static uint32_t list_strands(const struct groom *groom, uint32_t round, struct pass *passes)
+{
+    uint32_t n = 0, active = 0;
+    for (uint32_t o = 0; o < groom->n_operators; o++) {
+        if (draws(&groom->operators[o], 0))
+            passes[n++] = (struct pass){.kind = STRANDS, .round = round, .op = o, .active = active};
+        active += groom->operators[o].enabled != 0;
     }
     return n;
 }
@@ -110,39 +153,49 @@ static uint32_t rounds_of(const struct groom_fit *fit)
     return rounds > 1 && winds(fit->groom) && fit->n < FEW_STRANDS * fit->n_guides ? rounds + 1 : rounds;
 }
 
-/* In a round: what strands share, then whom they follow in it, then what each has of its own; between rounds,
+/* In a round: what strands share, then whom they follow in it, then what each has of its own, and, for that, what they
+ * share once more: how often strands wind and how long they are crawl towards each other else. Between rounds,
  * guides for these numbers, for those before were for any, and parameters for the guides. */
+static uint32_t list_round(const struct groom_fit *fit, uint32_t round, int last, struct pass *passes)
+{
+    uint32_t n = 0, n_curls = list_curls(fit->groom, round, round > 0, passes);
+    n += n_curls;
+    if (round > 0 && n_curls > 0 && fit->n < SOME_STRANDS * fit->n_guides) {
+        passes[n++] = (struct pass){.kind = GUIDES, .round = round};
+        n += list_curls(fit->groom, round, 1, passes + n);
+    }
+    if (n_curls > 0 || clumps(fit->groom))
+        passes[n++] = (struct pass){.kind = FOLLOW, .round = round};
+    n += list_strands(fit->groom, round, passes + n);
+    if (n == 0)
+        return 0;
+    if (n_curls > 0) {
+        passes[n++] = (struct pass){.kind = POLISH, .round = round};
+        n += list_curls(fit->groom, round, 1, passes + n);
+    }
+    passes[n++] = (struct pass){.kind = POLISH, .round = round, .last = last};
+    if (last && fit->options.stages.randoms.refinements > 0)
+        passes[n++] = (struct pass){.kind = CALIBRATE, .round = round};
+    if (last && fit->bvh)
+        passes[n++] = (struct pass){.kind = CLEAR, .round = round};
+    if (!last) {
+        passes[n++] = (struct pass){.kind = CENTRE, .round = round};
+        passes[n++] = (struct pass){.kind = RESHAPE, .round = round};
+    }
+    return n;
+}
+
 static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST_PASSES])
 {
     uint32_t n = 0, n_rounds = rounds_of(fit);
-    for (uint32_t round = 0; round < n_rounds && n + 4 * GROOM_FIT_MAX_OPERATORS + 6 <= MOST_PASSES; round++) {
-        uint32_t n_curls = list_numbers(fit->groom, round, 1, passes + n), begin = n;
-        n += n_curls;
-        if (round > 0 && n_curls > 0 && fit->n < SOME_STRANDS * fit->n_guides) {
-            passes[n++] = (struct pass){.kind = GUIDES, .round = round};
-            n += list_numbers(fit->groom, round, 1, passes + n);
-        }
-        if (n_curls > 0 || clumps(fit->groom))
-            passes[n++] = (struct pass){.kind = FOLLOW, .round = round};
-        n += list_numbers(fit->groom, round, 0, passes + n);
-        if (n > begin) {
-            passes[n++] = (struct pass){.kind = POLISH, .round = round};
-            if (round + 1 == n_rounds && fit->options.stages.randoms.refinements > 0)
-                passes[n++] = (struct pass){.kind = CALIBRATE, .round = round};
-            if (round + 1 == n_rounds && fit->bvh)
-                passes[n++] = (struct pass){.kind = CLEAR, .round = round};
-            if (round + 1 < n_rounds) {
-                passes[n++] = (struct pass){.kind = CENTRE, .round = round};
-                passes[n++] = (struct pass){.kind = RESHAPE, .round = round};
-            }
-        }
-    }
+    for (uint32_t round = 0; round < n_rounds && n + PASSES_OF_ROUND <= MOST_PASSES; round++)
+        n += list_round(fit, round, round + 1 == n_rounds, passes + n);
     return n;
 }
 
 static uint32_t size_of(const struct groom_fit *fit, const struct pass *pass)
 {
-    if (pass->kind == LAW || pass->kind == CENTRE || pass->kind == GUIDES || pass->kind == RESHAPE ||
+    if (pass->kind == LENGTHS || pass->kind == LAW || pass->kind == CENTRE || pass->kind == GUIDES || pass->kind == RESHAPE ||
         pass->kind == CALIBRATE)
         return 1;
     return pass->kind == CURLS ? fit->groom->n_operator_guides : fit->n;
@@ -160,7 +213,8 @@ static int is_by_length(const struct groom_fit *fit, const struct pass *pass)
 static uint32_t leave_out(const struct groom_fit *fit, const struct pass *pass)
 {
     uint32_t bits = 0, active = 0;
-    if (pass->round > 0 || pass->kind == POLISH || pass->kind == CLEAR || is_by_length(fit, pass))
+    int looks = pass->kind == FOLLOW || pass->kind == STRANDS || ((pass->kind == CURLS || pass->kind == LAW) && pass->look != AROUND);
+    if (pass->round > 0 || !looks || is_by_length(fit, pass))
         return 0;
     for (uint32_t o = 0; o < fit->groom->n_operators; o++) {
         const struct groom_operator *op = &fit->groom->operators[o];
@@ -211,16 +265,13 @@ static void sort_by_guide(const struct groom *groom, uint32_t *begin, uint32_t *
     begin[0] = 0;
 }
 
-/* The active index of the scale that stands last before an operator, or UINT32_MAX. */
-static uint32_t scale_before(const struct groom *groom, uint32_t op)
+/* The same among operators that are enabled. */
+static uint32_t active_scale_before(const struct groom *groom, uint32_t op)
 {
-    uint32_t found = UINT32_MAX, active = 0;
-    for (uint32_t o = 0; o < op; o++) {
-        if (groom->operators[o].type == GROOM_OPERATOR_SCALE && has_effect(&groom->operators[o]))
-            found = active;
+    uint32_t scale = scale_before(groom, op), active = 0;
+    for (uint32_t o = 0; scale != UINT32_MAX && o < scale; o++)
         active += groom->operators[o].enabled != 0;
-    }
-    return found;
+    return scale != UINT32_MAX ? active : UINT32_MAX;
 }
 
 /* Curls first .. first + count - 1; half: NULL, or by halves of all curls' strands. */
@@ -234,12 +285,12 @@ static groom_status search_curls(struct groom_fit *fit, struct random_search *se
     uint32_t *member = memory_array(allocator, fit->n, sizeof *member);
     groom_status st = begin && member ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to sort strands");
     uint32_t n_asked = fit->options.stages.randoms.strands;
-    n_asked = n_asked > 1 && (half || pass->wide) ? n_asked / 2 : n_asked; /* of each half; a wide look is a rough one */
+    n_asked = n_asked > 1 && (half || pass->look == BEYOND) ? n_asked / 2 : n_asked; /* of each half; the first look is a rough one */
     if (st == GROOM_OK) {
-        struct random_search_groups groups = {member, begin, n_asked, pass->round == 0,
-                                              scale_before(fit->groom, pass->op)};
+        struct random_search_groups groups = {member, begin, n_asked, pass->look != AROUND,
+                                              active_scale_before(fit->groom, pass->op)};
         sort_by_guide(fit->groom, begin, member);
-        if (!half && pass->wide && fit->iteration == 0)
+        if (!half && pass->look == BEYOND && fit->iteration == 0)
             frequencies_widen(fit->groom, &fit->groom->operators[pass->op]);
         if (half)
             random_search_halves(search, pass->active, &groups, half, context);
@@ -258,11 +309,11 @@ static groom_status restate_frequencies(struct groom_fit *fit, struct random_sea
     uint32_t n = fit->groom->n_operator_guides;
     float (*half)[2] = memory_array(allocator, n, sizeof *half);
     groom_status st = half ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory for the frequencies of %u curls", n);
-    if (st == GROOM_OK && !pass->wide)
+    if (st == GROOM_OK && pass->look != BEYOND)
         st = search_curls(fit, search, pass, n, half, context, diag);
     if (st == GROOM_OK)
-        st = frequencies_restate(fit->groom, &fit->groom->operators[pass->op], pass->wide ? NULL : (const float (*)[2])half,
-                                 allocator, diag);
+        st = frequencies_restate(fit->groom, &fit->groom->operators[pass->op],
+                                 pass->look == BEYOND ? NULL : (const float (*)[2])half, allocator, diag);
     memory_release(allocator, half, n, sizeof *half);
     return st;
 }
@@ -300,6 +351,7 @@ static uint32_t step_size(const struct groom_fit *fit, const struct pass *pass)
     case STRANDS: values = grid_of(fit, pass); break;
     case CURLS: values = CURL_VALUES * fit->options.stages.randoms.strands; break;
     case POLISH: values = POLISH_VALUES; break;
+    case LENGTHS:
     case LAW:
     case CENTRE:
     case GUIDES:
@@ -309,11 +361,6 @@ static uint32_t step_size(const struct groom_fit *fit, const struct pass *pass)
     }
     wanted = STEP_WORK / values > 1 ? STEP_WORK / values : 1;
     return wanted < left ? wanted : left;
-}
-
-static int is_last(const struct groom_fit *fit, const struct pass *pass)
-{
-    return pass->round + 1 == rounds_of(fit);
 }
 
 static groom_status clear_head(struct groom_fit *fit, struct random_search *search, uint32_t count,
@@ -345,11 +392,12 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
     case CURLS: return search_curls(fit, search, pass, count, NULL, context, diag);
     case LAW: return restate_frequencies(fit, search, pass, context, diag);
     case POLISH:
-        /* weights only where no guides and parameters come after: these would follow where strands have slipped to */
-        random_search_polish(search, fit->iteration, count, is_last(fit, pass) ? POLISH_STEPS : 1,
-                             (float)fit->options.stages.randoms.hold, is_last(fit, pass), context);
+        /* weights only where nothing comes after that would follow to where strands have slipped */
+        random_search_polish(search, fit->iteration, count, pass->last ? POLISH_STEPS : 1,
+                             (float)fit->options.stages.randoms.hold, pass->last, context);
         return GROOM_OK;
     case CLEAR: return clear_head(fit, search, count, context, diag);
+    case LENGTHS:
     case CENTRE:
     case GUIDES:
     case RESHAPE:
@@ -388,6 +436,14 @@ static groom_status centre_step(struct groom_fit *fit)
     return GROOM_OK;
 }
 
+static groom_status lengths_step(struct groom_fit *fit, const struct pass *pass, const struct groom_context *context,
+                                 struct groom_diag *diag)
+{
+    struct groom *groom = fit->groom;
+    return lengths_settle(groom, &groom->operators[pass->op], &groom->operators[scale_before(groom, pass->op)],
+                          memory_allocator(context), diag);
+}
+
 static groom_status reshape_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     groom_status st = guides_refine(fit, context, diag);
@@ -416,6 +472,7 @@ static groom_status pass_step(struct groom_fit *fit, const struct pass *pass, co
 {
     uint32_t count = step_size(fit, pass);
     groom_status st = pass->kind == CENTRE      ? centre_step(fit)
+                      : pass->kind == LENGTHS   ? lengths_step(fit, pass, context, diag)
                       : pass->kind == GUIDES    ? guides_refine(fit, context, diag)
                       : pass->kind == RESHAPE   ? reshape_step(fit, context, diag)
                       : pass->kind == CALIBRATE ? calibrate_frizz(fit, context, diag)
