@@ -9,9 +9,10 @@
 
 #define MOST RANDOM_BLOCK_MOVED      /* numbers of a strand that are moved at once */
 #define WEIGHT_STEP 0.05f  /* of a difference, in an instancing weight */
-#define SCALE_STEP 0.02f   /* in random numbers */
-#define BEND_STEP 0.01f
-#define FRIZZ_STEP 0.004f
+#define SCALE_STEP 0.1f    /* in random numbers: over less, rounding tells more of how an error bends than the strand does */
+#define BEND_STEP 0.05f
+#define FRIZZ_STEP 0.004f  /* noise is rugged */
+#define FARTHEST_STEP 4.0  /* times those: differences tell nothing of what is farther, and rounding decides where steps go */
 #define FLAT 1e-4          /* of an error that differs by no more over a step nothing is known: numbers stay where they are */
 
 struct polish_job {
@@ -110,6 +111,17 @@ static void differentiate(struct polish *polish, lanes gradient[MOST], lanes hes
         }
 }
 
+/* As a whole as short as no number moves farther than it may; weights have a range of their own. */
+static void shorten(const struct polish *polish, double step[MOST])
+{
+    double over = 1;
+    for (uint32_t i = 0; i < polish->n; i++)
+        if (!polish->at[i].is_weight)
+            over = fmax(over, fabs(step[i]) / (FARTHEST_STEP * (double)polish->at[i].step));
+    for (uint32_t i = 0; i < polish->n; i++)
+        step[i] /= over;
+}
+
 /* (H + damping) step = -g of one lane, with as much damping as makes it positive definite. */
 static void solve_lane(const struct polish *polish, lanes gradient[MOST], lanes hessian[MOST][MOST], int l,
                        double damping, double step[MOST])
@@ -127,6 +139,7 @@ static void solve_lane(const struct polish *polish, lanes gradient[MOST], lanes 
         if (dense_cholesky(a, n)) {
             dense_forward(a, n, step);
             dense_backward(a, n, step);
+            shorten(polish, step);
             return;
         }
     }
