@@ -45,7 +45,7 @@ enum phase { SOLVE, ASSIGN, ENDED };
 #define ROUNDS_KNOWN 1          /* of guides that were out of the head already */
 #define HOLD_ROOT_EXPECTED 0.1 /* of an operator guide at its likeliest place, over the weight of its strands' vertices; */
 #define HOLD_ROOT_KNOWN 0.03   /* where it was found so far, where random numbers are known, and scatter less; */
-#define HOLD_ROOT_THERE 0.01   /* then, at its likeliest place */
+#define HOLD_ROOT_THERE 0.003  /* then, at its likeliest place */
 #define HOLD 1.0      /* of a vertex at the head, over the weight of a guide's strands */
 #define ASKED 8       /* strands of a guide that are asked whether they are in the head */
 #define FARTHEST 100.0 /* vertex from its root, over the size of the hair */
