@@ -8,6 +8,7 @@
 #include "fit/follow.h"
 #include "fit/gather.h"
 #include "fit/head_planes.h"
+#include "fit/strand_state.h"
 #include "geometry/side.h"
 #include "groom/spatial.h"
 
@@ -101,63 +102,6 @@ static groom_status measure(struct random_search *search, const uint32_t *strand
     return GROOM_OK;
 }
 
-/* --- what strands have of their own ------------------------------------------------------------ */
-
-/* Of some strands, to be had back. */
-struct kept {
-    const uint32_t *strand; /* [n] borrowed, or NULL: from `first` on */
-    uint32_t first, n, k;
-    uint32_t *guide;  /* [n * k] */
-    uint32_t *follows; /* [n] */
-    float *weight;    /* [n * k] */
-    float *number;    /* [operators][n] of those that draw one a strand */
-};
-
-static int draws_for_strands(const struct groom_operator *op)
-{
-    return groom_operator_random_arrays(op->type) > 0 && !groom_operator_random_per_guide(op->type);
-}
-
-static groom_status keep(struct kept *kept, const struct groom *groom, const uint32_t *strand, uint32_t first, uint32_t n,
-                         const struct groom_allocator *allocator, struct groom_diag *diag)
-{
-    uint32_t k = groom->n_instancing;
-    *kept = (struct kept){strand, first, n, k, memory_array(allocator, (size_t)n * k, sizeof *kept->guide),
-                          memory_array(allocator, n, sizeof *kept->follows), memory_array(allocator, (size_t)n * k, sizeof *kept->weight),
-                          memory_array(allocator, (size_t)n * GROOM_FIT_MAX_OPERATORS, sizeof *kept->number)};
-    if (!kept->guide || !kept->follows || !kept->weight || !kept->number)
-        return groom_fail(diag, GROOM_ENOMEM, "no memory to take %u strands out of the head", n);
-    for (uint32_t at = 0; at < n; at++) {
-        size_t i = strand ? strand[at] : first + at;
-        kept->follows[at] = groom->operator_guide_of[i];
-        memcpy(kept->guide + (size_t)at * k, groom->instancing_guide + i * k, k * sizeof *kept->guide);
-        memcpy(kept->weight + (size_t)at * k, groom->instancing_weight + i * k, k * sizeof *kept->weight);
-        for (uint32_t o = 0; o < groom->n_operators; o++)
-            if (draws_for_strands(&groom->operators[o]))
-                kept->number[(size_t)o * n + at] = groom->operators[o].random[0][i];
-    }
-    return GROOM_OK;
-}
-
-static void give_back(const struct kept *kept, struct groom *groom, uint32_t at)
-{
-    size_t k = kept->k, i = kept->strand ? kept->strand[at] : kept->first + at;
-    groom->operator_guide_of[i] = kept->follows[at];
-    memcpy(groom->instancing_guide + i * k, kept->guide + at * k, k * sizeof *kept->guide);
-    memcpy(groom->instancing_weight + i * k, kept->weight + at * k, k * sizeof *kept->weight);
-    for (uint32_t o = 0; o < groom->n_operators; o++)
-        if (draws_for_strands(&groom->operators[o]))
-            groom->operators[o].random[0][i] = kept->number[(size_t)o * kept->n + at];
-}
-
-static void kept_finish(struct kept *kept, const struct groom_allocator *allocator)
-{
-    memory_release(allocator, kept->guide, (size_t)kept->n * kept->k, sizeof *kept->guide);
-    memory_release(allocator, kept->follows, kept->n, sizeof *kept->follows);
-    memory_release(allocator, kept->weight, (size_t)kept->n * kept->k, sizeof *kept->weight);
-    memory_release(allocator, kept->number, (size_t)kept->n * GROOM_FIT_MAX_OPERATORS, sizeof *kept->number);
-}
-
 /* --- ways out ---------------------------------------------------------------------------------- */
 
 static uint32_t lesser(uint32_t a, uint32_t b) { return a < b ? a : b; }
@@ -219,16 +163,6 @@ static groom_status choose_guides(struct random_search *search, uint32_t n, uint
     return st;
 }
 
-static void search_numbers(struct random_search *search, uint32_t n, const struct groom_context *context)
-{
-    const struct plan *plan = &search->plan;
-    for (uint32_t a = 0; a < plan->n_active; a++) {
-        const struct groom_operator *op = &plan->groom->operators[plan->active[a]];
-        if (draws_for_strands(op))
-            random_search_strands(search, a, 0, n, VALUES, HALVINGS, context);
-    }
-}
-
 /* What is deeper in the head than its target: from where it is; then, try by try, from other guides and on from there.
  * Planes beside the target tell little of where a strand far from it is in the head, so that the guides that promise most
  * may not keep what they promise, and others are tried. At last all that is in the head. */
@@ -253,7 +187,7 @@ static groom_status blend_anew(struct random_search *search, uint32_t n, uint32_
     if (st == GROOM_OK)
         st = choose_guides(search, n, n_tries == 0 ? NEAR : AFAR, n_tries, context, diag);
     if (st == GROOM_OK)
-        search_numbers(search, n, context);
+        random_search_numbers(search, 0, n, VALUES, VALUES, HALVINGS, context);
     return st;
 }
 
@@ -301,7 +235,7 @@ static int is_better(const struct clearing *job, uint32_t at)
     return after->beyond[at] <= job->deep && after->depth[at] < now->depth[i] && after->error[at] <= AS_NEAR * now->error[i];
 }
 
-static void keep_better(struct clearing *job, const struct kept *before)
+static void keep_better(struct clearing *job, const struct strand_state *before)
 {
     for (uint32_t at = 0; at < job->n; at++) {
         uint32_t i = job->strand[at] - job->first;
@@ -310,7 +244,7 @@ static void keep_better(struct clearing *job, const struct kept *before)
             job->now.beyond[i] = job->after.beyond[at];
             job->now.error[i] = job->after.error[at];
         } else
-            give_back(before, job->search->fit->groom, at);
+            strand_state_give_back(before, job->search->fit->groom, at);
     }
 }
 
@@ -318,14 +252,14 @@ static groom_status try_way(struct clearing *job, struct way way, const struct g
                             struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
-    struct kept before;
-    groom_status st = keep(&before, job->search->fit->groom, job->strand, 0, job->n, allocator, diag);
+    struct strand_state before;
+    groom_status st = strand_state_init(&before, job->search->fit->groom, job->strand, 0, job->n, allocator, diag);
     job->search->only = job->strand;
     job->search->weights.depth = ldexpf(job->price, (int)way.n_tries);
     if (st == GROOM_OK && (st = take(way, job->search, job->n, context, diag)) == GROOM_OK &&
         (st = measure(job->search, job->strand, job->n, job->points, job->target, &job->after, context, diag)) == GROOM_OK)
         keep_better(job, &before);
-    kept_finish(&before, allocator);
+    strand_state_finish(&before, allocator);
     return st;
 }
 
@@ -366,8 +300,8 @@ groom_status head_clear(struct random_search *search, uint32_t first, uint32_t c
     struct clearing job = {.search = search, .deep = (float)HEAD_TOO_DEEP * search->fit->ordinary,
                            .price = STIFF * search->weights.depth};
     struct head_left found = {.depth = (float)LEFT * search->fit->ordinary};
-    struct kept whole;
-    groom_status st = keep(&whole, search->fit->groom, NULL, first, count, allocator, diag);
+    struct strand_state whole;
+    groom_status st = strand_state_init(&whole, search->fit->groom, NULL, first, count, allocator, diag);
     int is_kept = st == GROOM_OK;
     float *floats = memory_array(allocator, (size_t)size * N_FLOATS, sizeof *floats);
     job.strand = memory_array(allocator, size, sizeof *job.strand);
@@ -382,10 +316,10 @@ groom_status head_clear(struct random_search *search, uint32_t first, uint32_t c
     for (uint32_t at = 0; st == GROOM_OK && at < count; at += size)
         st = clear_chunk(&job, first + at, lesser(count - at, size), &found, context, diag);
     for (uint32_t at = 0; is_kept && st != GROOM_OK && at < count; at++) /* a step that fails has changed nothing */
-        give_back(&whole, search->fit->groom, at);
+        strand_state_give_back(&whole, search->fit->groom, at);
     if (st == GROOM_OK)
         *left = found;
-    kept_finish(&whole, allocator);
+    strand_state_finish(&whole, allocator);
     memory_release(allocator, floats, (size_t)size * N_FLOATS, sizeof *floats);
     memory_release(allocator, job.strand, size, sizeof *job.strand);
     memory_release(allocator, job.points, (size_t)size * m, sizeof *job.points);

@@ -6,6 +6,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "fit/random_block.h"
+#include "fit/strand_state.h"
 #include "groom/strands.h"
 
 #define MOST_INSTANCES 8       /* guides of a strand */
@@ -111,6 +112,17 @@ void random_search_strands(struct random_search *search, uint32_t active, uint32
     struct strands_job job = {search, active, first, count, n_grid, n_halvings, random[0].minimum, random[0].maximum,
                               op->random[0]};
     parallel_for(context, (count + RANDOM_BLOCK_PIECE - 1) / RANDOM_BLOCK_PIECE, search_piece, &job);
+}
+
+void random_search_numbers(struct random_search *search, uint32_t first, uint32_t count, uint32_t n_grid, uint32_t n_rugged,
+                           uint32_t n_halvings, const struct groom_context *context)
+{
+    for (uint32_t a = 0; a < search->plan.n_active; a++) {
+        const struct groom_operator *op = operator_of(search, a);
+        uint32_t n = op->type == GROOM_OPERATOR_FRIZZ ? n_rugged : n_grid;
+        if (strand_state_draws(op))
+            random_search_strands(search, a, first, count, n, n_halvings, context);
+    }
 }
 
 /* --- the operator guide of a strand ----------------------------------------------------------------- */

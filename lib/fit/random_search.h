@@ -38,6 +38,11 @@ void random_search_finish(struct random_search *search);
 void random_search_strands(struct random_search *search, uint32_t active, uint32_t first, uint32_t count,
                            uint32_t n_grid, uint32_t n_halvings, const struct groom_context *context);
 
+/* All numbers of these strands, operator by operator along the chain.
+ * n_rugged   values of a number that the error is rugged in, which frizz's is */
+void random_search_numbers(struct random_search *search, uint32_t first, uint32_t count, uint32_t n_grid, uint32_t n_rugged,
+                           uint32_t n_halvings, const struct groom_context *context);
+
 /* The two numbers of operator guides first .. first + count - 1 in a curl: what is best for their strands
  * together.
  * member   [n] strands by operator guide, `begin` [n_gop + 1] where each guide's begin
