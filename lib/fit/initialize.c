@@ -21,7 +21,9 @@ enum phase { SEED, CLUSTER, GUIDES, OPERATOR_GUIDES, OPERATORS, BUNDLES, INSTANC
 #define STREAM_CLUSTERS 0x66690001u
 #define STREAM_MEDOIDS 0x66690002u
 
-#define FEATURE_VERTICES 16        /* of a strand, where seeds are drawn */
+#define FEATURE_VERTICES 16        /* of a strand, where seeds are drawn; */
+#define CLUSTER_SHARE 3            /* one in so many, where clusters are looked for; */
+#define WHOLE_ITERATIONS 2         /* of K-means, the last ones: all of them */
 #define STEP_PRODUCTS 3e10         /* multiplications of K-means in a step: about half a second on two cores */
 #define LEAST_CLUSTER 4            /* strands a guide, where the number of guides is automatic */
 #define FEW_STRANDS 16             /* so many may each be their own guide: they need not be alike */
@@ -40,16 +42,12 @@ static uint32_t automatic_guides(uint32_t n)
     return least(guides, most);
 }
 
-/* A few vertices of each strand say enough where only seeds are wanted. [n][3 * *n_vertices] */
-static float *features_of(const struct groom_fit *fit, const struct groom_allocator *allocator, uint32_t *n_vertices)
+/* q vertices of each of n strands of m, evenly. out [n][q] */
+static void take_features(const float (*points)[3], uint32_t n, uint32_t m, uint32_t q, float (*out)[3])
 {
-    uint32_t q = *n_vertices = least(fit->m, FEATURE_VERTICES);
-    float (*features)[3] = memory_array(allocator, (size_t)fit->n * q, sizeof *features);
-    for (uint32_t i = 0; features && i < fit->n; i++)
+    for (uint32_t i = 0; i < n; i++)
         for (uint32_t a = 0; a < q; a++)
-            memcpy(features[(size_t)i * q + a], fit->target[(size_t)i * fit->m + a * (fit->m - 1) / (q - 1)],
-                   sizeof *features);
-    return (float *)features;
+            memcpy(out[(size_t)i * q + a], points[(size_t)i * m + a * (m - 1) / (q - 1)], sizeof *out);
 }
 
 static groom_status keep_seeds(struct groom_fit *fit, const uint32_t *chosen, uint32_t n_guides,
@@ -74,9 +72,9 @@ static groom_status keep_seeds(struct groom_fit *fit, const uint32_t *chosen, ui
 static groom_status seed_clusters(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
-    uint32_t asked = fit->options.guides, n_vertices, n_chosen;
+    uint32_t asked = fit->options.guides, n_vertices = least(fit->m, FEATURE_VERTICES), n_chosen;
     uint32_t wanted = least(asked == GROOM_FIT_AUTO ? automatic_guides(fit->n) : asked, fit->n);
-    float *features = features_of(fit, allocator, &n_vertices);
+    float (*features)[3] = memory_array(allocator, (size_t)fit->n * n_vertices, sizeof *features);
     uint32_t *chosen = memory_array(allocator, wanted, sizeof *chosen);
     struct groom_random_key key = {FIT_OWN_SEED, STREAM_CLUSTERS};
     groom_status st;
@@ -85,14 +83,15 @@ static groom_status seed_clusters(struct groom_fit *fit, const struct groom_cont
         st = groom_fail(diag, GROOM_ENOMEM, "no memory to seed %u clusters", wanted);
         goto out;
     }
-    st = kmeans_seed(features, fit->n, 3 * n_vertices, wanted, key, context, chosen, &n_chosen, diag);
+    take_features((const float (*)[3])fit->target, fit->n, fit->m, n_vertices, features); /* enough where only seeds are wanted */
+    st = kmeans_seed(features[0], fit->n, 3 * n_vertices, wanted, key, context, chosen, &n_chosen, diag);
     if (st != GROOM_OK || (st = keep_seeds(fit, chosen, n_chosen, diag)) != GROOM_OK)
         goto out;
     if (asked > n_chosen)
         report_note(&fit->report, "%u guides were asked for; %u different strands allow %u.", asked, n_chosen, n_chosen);
     fit->phase = CLUSTER;
 out:
-    memory_release(allocator, features, (size_t)fit->n * n_vertices, 3 * sizeof *features);
+    memory_release(allocator, features, (size_t)fit->n * n_vertices, sizeof *features);
     memory_release(allocator, chosen, wanted, sizeof *chosen);
     return st;
 }
@@ -100,34 +99,74 @@ out:
 /* --- clusters -------------------------------------------------------------------- */
 
 /* The loss of K-means in square metres a vertex, like Eq. 5. */
-static double in_square_metres(const struct groom_fit *fit, double objective)
-{
-    return objective * fit->scale * fit->scale / fit->m;
-}
-
-static void note_objective(struct groom_fit *fit, double objective, const struct groom_context *context)
+static void note_objective(struct groom_fit *fit, double objective, uint32_t n_vertices, const struct groom_context *context)
 {
     struct groom_fit_report *report = &fit->report;
-    double value = in_square_metres(fit, objective);
+    double value = objective * fit->scale * fit->scale / n_vertices;
     if (fit->iteration == 0)
         report_loss(report, "initialize", "cluster", value, value);
     report->losses[report->n_losses - 1].after = value;
     progress_loss(context, "cluster", fit->iteration, value);
 }
 
+/* An iteration of K-means on q vertices of each strand; all vertices follow. */
+static groom_status iterate_on_features(struct groom_fit *fit, uint32_t q, struct kmeans_step *step,
+                                        const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    size_t n_rows = (size_t)fit->n * q, n_centres = (size_t)fit->n_guides * q;
+    float (*rows)[3] = memory_array(allocator, n_rows, sizeof *rows);
+    float (*centres)[3] = memory_array(allocator, n_centres, sizeof *centres);
+    uint32_t *cluster_of = memory_array(allocator, fit->n, sizeof *cluster_of);
+    groom_status st = rows && centres && cluster_of ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to cluster %u strands", fit->n);
+    if (st == GROOM_OK) {
+        take_features((const float (*)[3])fit->target, fit->n, fit->m, q, rows);
+        take_features((const float (*)[3])fit->centroids, fit->n_guides, fit->m, q, centres);
+        memcpy(cluster_of, fit->cluster_of, fit->n * sizeof *cluster_of);
+        st = kmeans_iterate(rows[0], fit->n, 3 * q, fit->n_guides, centres[0], cluster_of, context, step, diag);
+    }
+    if (st == GROOM_OK)
+        st = kmeans_means(fit->target[0], fit->n, 3 * fit->m, fit->n_guides, cluster_of, fit->centroids[0], context, diag);
+    if (st == GROOM_OK)
+        memcpy(fit->cluster_of, cluster_of, fit->n * sizeof *cluster_of);
+    memory_release(allocator, rows, n_rows, sizeof *rows);
+    memory_release(allocator, centres, n_centres, sizeof *centres);
+    memory_release(allocator, cluster_of, fit->n, sizeof *cluster_of);
+    return st;
+}
+
+/* Neighbouring vertices say much the same: where clusters are only on their way, some are enough. */
+static uint32_t vertices_of_iteration(const struct groom_fit *fit)
+{
+    uint32_t most = fit->options.stages.initialize.cluster_iterations, some = fit->m / CLUSTER_SHARE;
+    return fit->iteration + WHOLE_ITERATIONS < most && some >= FEATURE_VERTICES ? some : fit->m;
+}
+
+static groom_status iterate(struct groom_fit *fit, uint32_t n_vertices, struct kmeans_step *step,
+                            const struct groom_context *context, struct groom_diag *diag)
+{
+    if (n_vertices < fit->m)
+        return iterate_on_features(fit, n_vertices, step, context, diag);
+    return kmeans_iterate(fit->target[0], fit->n, 3 * fit->m, fit->n_guides, fit->centroids[0], fit->cluster_of, context, step,
+                          diag);
+}
+
 static groom_status cluster(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
-    double products = (double)fit->n * fit->n_guides * 3 * fit->m;
     uint32_t most = fit->options.stages.initialize.cluster_iterations;
     struct kmeans_step step;
-    for (double spent = 0; spent == 0 || spent + products <= STEP_PRODUCTS; spent += products) {
-        groom_status st = kmeans_iterate(fit->target[0], fit->n, 3 * fit->m, fit->n_guides, fit->centroids[0],
-                                         fit->cluster_of, context, &step, diag);
+    for (double spent = 0, products = 0; spent == 0 || spent + products <= STEP_PRODUCTS; spent += products) {
+        uint32_t n_vertices = vertices_of_iteration(fit);
+        groom_status st = iterate(fit, n_vertices, &step, context, diag);
         if (st != GROOM_OK)
             return st;
-        note_objective(fit, step.objective, context);
+        products = (double)fit->n * fit->n_guides * 3 * n_vertices;
+        note_objective(fit, step.objective, n_vertices, context);
+        int settled = fit->iteration > 0 && step.n_changed == 0;
         fit->iteration++;
-        if (fit->iteration >= most || (fit->iteration > 1 && step.n_changed == 0)) {
+        if (settled && n_vertices < fit->m)
+            fit->iteration = most > WHOLE_ITERATIONS ? most - WHOLE_ITERATIONS : fit->iteration;
+        else if (fit->iteration >= most || settled) {
             fit->phase = GUIDES;
             fit->iteration = 0;
             break;

@@ -230,3 +230,21 @@ out:
     release(&l, allocator, n_threads);
     return st;
 }
+
+groom_status kmeans_means(const float *x, uint32_t n, uint32_t d, uint32_t k, const uint32_t *cluster_of, float *centres,
+                          const struct groom_context *context, struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    uint32_t n_threads = parallel_threads(context);
+    struct lloyd l = {.x = x, .n = n, .d = d, .k = k, .centres = centres, .context = context};
+    groom_status st = GROOM_OK;
+    if (allocate(&l, allocator, n_threads)) {
+        memcpy(l.nearest, cluster_of, n * sizeof *l.nearest);
+        sort_members(&l);
+        parallel_for(context, pieces_of(k, CENTRES_PER_PIECE), mean_piece, &l);
+        memcpy(centres, l.means, (size_t)k * d * sizeof *centres);
+    } else
+        st = groom_fail(diag, GROOM_ENOMEM, "no memory for the means of %u rows, %u clusters", n, k);
+    release(&l, allocator, n_threads);
+    return st;
+}

@@ -38,4 +38,12 @@ GROOM_MUST_CHECK groom_status kmeans_iterate(const float *x, uint32_t n, uint32_
                                              uint32_t *cluster_of, const struct groom_context *context,
                                              struct kmeans_step *step, struct groom_diag *diag);
 
+/* Centres at the means of their rows: a cluster without rows keeps its own.
+ * x           [n][d]
+ * cluster_of  [n] of k
+ * centres     [k][d] read and written
+ * returns     GROOM_OK, GROOM_ENOMEM */
+GROOM_MUST_CHECK groom_status kmeans_means(const float *x, uint32_t n, uint32_t d, uint32_t k, const uint32_t *cluster_of,
+                                           float *centres, const struct groom_context *context, struct groom_diag *diag);
+
 #endif
