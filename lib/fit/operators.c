@@ -38,6 +38,7 @@ enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 #define FLOOR_FIRST 0.3        /* of the statistics in the first step, and how it falls to the last */
 #define FLOOR_RATIO 0.5
 #define FLOOR_LAST 0.01
+#define SEARCH_SHARE 3         /* one pair in so many */
 #define PROBE 0.03             /* step of a finite difference of a frequency's logarithm or a fraction of a strand */
 #define PROBE_SIZE 0.1         /* of the logarithm of a size: wide, so that rounding of strands does not show in a slope */
 #define LONGEST_STEP 0.7       /* of a parameter in one step of refinement */
@@ -467,6 +468,13 @@ static double floor_of(const struct groom_fit *fit)
     return fit->phase == SEARCH ? FLOOR_FIRST : fmax(FLOOR_FIRST * pow(FLOOR_RATIO, fit->iteration), FLOOR_LAST);
 }
 
+/* Where a frequency looks for its valley, some of the pairs tell. */
+static uint32_t pairs_of(const struct groom_fit *fit)
+{
+    uint32_t pairs = fit->options.stages.operators.pairs;
+    return fit->phase == SEARCH ? (pairs + SEARCH_SHARE - 1) / SEARCH_SHARE : pairs;
+}
+
 static void begin(struct groom_fit *fit)
 {
     struct trial trial;
@@ -526,7 +534,7 @@ static groom_status refine_step(struct groom_fit *fit, struct matching *matching
 static groom_status match_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     struct matching *matching;
-    groom_status st = matching_create(fit, fit->options.stages.operators.pairs, floor_of(fit), context, &matching, diag);
+    groom_status st = matching_create(fit, pairs_of(fit), floor_of(fit), context, &matching, diag);
     if (st != GROOM_OK)
         return st;
     st = fit->phase == SEARCH ? search_step(fit, matching, context, diag) : refine_step(fit, matching, context, diag);
