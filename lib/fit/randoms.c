@@ -7,9 +7,9 @@
  * again in the next round with what the others have found. What is brought down are Eq. 19's directions and
  * lengths with the distances of vertices; its spectra follow, as they can be no farther apart than directions.
  *
- * A strand may also follow another operator guide near it, whose curl or clump it belongs to by its looks,
- * and at the end of a round its numbers and instancing weights take Newton's steps together
- * (random_polish.c).
+ * A strand may also follow another operator guide near it, whose curl or clump it belongs to by its looks; one that is
+ * far off looks for all of this at once (strays.h). At the end of a round its numbers and instancing weights take
+ * Newton's steps together (random_polish.c).
  *
  * All along, to be deeper in the head than its target costs a strand more than to be as far from it elsewhere; what
  * is in the head at the end is taken out by a pass of its own (head_clear.h).
@@ -31,13 +31,15 @@
 #include "fit/operators.h"
 #include "fit/paper_randoms.h"
 #include "fit/random_search.h"
+#include "fit/regroup.h"
+#include "fit/strays.h"
 
 #define UNIT 0.1             /* metres on an ordinary head: what the paper's weights were made for */
 #define LOSS_STRANDS 4000    /* of which the losses are measured */
 #define SMOOTH_VALUES 24     /* of a number that the error is smooth in */
 #define HALVINGS 3           /* of the step around the best value: Newton's steps do the rest */
 #define STEP_WORK 1200000    /* strands times values of one step: about a second */
-#define PASSES_OF_ROUND (9 * GROOM_FIT_MAX_OPERATORS + 7) /* at most */
+#define PASSES_OF_ROUND (9 * GROOM_FIT_MAX_OPERATORS + 9) /* at most */
 #define MOST_PASSES (4 * PASSES_OF_ROUND)
 #define FEW_STRANDS 6        /* a guide: another round for curls; */
 #define SOME_STRANDS 16      /* another look at guides and curls */
@@ -46,17 +48,19 @@
 #define CURL_VALUES 256      /* about: values of a curl's numbers that are tried */
 #define DEPTH 10.0           /* what depth in the head costs, over distance */
 #define POLISH_STEPS 3       /* at the end; 1 before */
+#define STRAYS_VALUES 100    /* about: as many evaluations as a look for strays costs, over all strands */
 #define CLEAR_VALUES 100     /* about: as many evaluations as a look for what is in the head costs */
 #define POLISH_VALUES 48     /* about: evaluations of them */
 
 /* --- the row of passes ------------------------------------------------------------------------- */
 
-/* What is looked for: which operator guide each strand follows, the numbers of strands in one operator,
- * those of operator guides, what the strands of these are long, the law that these follow, the last digits of all that a
- * strand has, what these tell of how long guides are, the guides that go with them, or these and the operators' parameters for them; at the end, how
- * strong frizz is for all that was found, and what is in the head. */
+/* What is looked for: which operator guide each strand follows, the numbers of strands in one operator, both at once of
+ * strands that are far off, the numbers of operator guides, what the strands of these are long, the law that these
+ * follow, the last digits of all that a strand has, which bundles are two, what numbers tell of how long guides are, the
+ * guides that go with them, or these and the operators' parameters for them; at the end, how strong frizz is for all that
+ * was found, and what is in the head. */
 struct pass {
-    enum { FOLLOW, STRANDS, CURLS, LENGTHS, LAW, POLISH, CENTRE, GUIDES, RESHAPE, CALIBRATE, CLEAR } kind;
+    enum { FOLLOW, STRANDS, STRAYS, CURLS, LENGTHS, LAW, POLISH, REGROUP, CENTRE, GUIDES, RESHAPE, CALIBRATE, CLEAR } kind;
     uint32_t round;
     uint32_t op, active; /* of STRANDS, CURLS, LENGTHS and LAW: its index in the chain, and among those that are enabled */
     enum { AROUND, WHOLE, BEYOND } look; /* of CURLS and LAW: around what was found, at the whole range, or at more
@@ -125,15 +129,25 @@ static uint32_t list_curls(const struct groom *groom, uint32_t round, int again,
     return n;
 }
 
+/* Numbers that the error is smooth in are where Newton's steps have brought them since, or of a stray. */
 static uint32_t list_strands(const struct groom *groom, uint32_t round, struct pass *passes)
 {
     uint32_t n = 0, active = 0;
     for (uint32_t o = 0; o < groom->n_operators; o++) {
-        if (draws(&groom->operators[o], 0))
+        int rugged = groom->operators[o].type == GROOM_OPERATOR_FRIZZ;
+        if (draws(&groom->operators[o], 0) && (round == 0 || rugged))
             passes[n++] = (struct pass){.kind = STRANDS, .round = round, .op = o, .active = active};
         active += groom->operators[o].enabled != 0;
     }
     return n;
+}
+
+static int draws_anything(const struct groom *groom)
+{
+    int any = 0;
+    for (uint32_t o = 0; o < groom->n_operators; o++)
+        any |= draws(&groom->operators[o], 0) || draws(&groom->operators[o], 1);
+    return any;
 }
 
 static int winds(const struct groom *groom)
@@ -154,8 +168,9 @@ static uint32_t rounds_of(const struct groom_fit *fit)
 }
 
 /* In a round: what strands share, then whom they follow in it, then what each has of its own, and, for that, what they
- * share once more: how often strands wind and how long they are crawl towards each other else. Between rounds,
- * guides for these numbers, for those before were for any, and parameters for the guides. */
+ * share once more: how often strands wind and how long they are crawl towards each other else. Between rounds, other
+ * bundles where these are not what they seemed, guides for these numbers, for those before were for any, and parameters
+ * for the guides. */
 static uint32_t list_round(const struct groom_fit *fit, uint32_t round, int last, struct pass *passes)
 {
     uint32_t n = 0, n_curls = list_curls(fit->groom, round, round > 0, passes);
@@ -167,8 +182,9 @@ static uint32_t list_round(const struct groom_fit *fit, uint32_t round, int last
     if (n_curls > 0 || clumps(fit->groom))
         passes[n++] = (struct pass){.kind = FOLLOW, .round = round};
     n += list_strands(fit->groom, round, passes + n);
-    if (n == 0)
+    if (n == 0 && !draws_anything(fit->groom))
         return 0;
+    passes[n++] = (struct pass){.kind = STRAYS, .round = round};
     if (n_curls > 0) {
         passes[n++] = (struct pass){.kind = POLISH, .round = round};
         n += list_curls(fit->groom, round, 1, passes + n);
@@ -179,6 +195,8 @@ static uint32_t list_round(const struct groom_fit *fit, uint32_t round, int last
     if (last && fit->bvh)
         passes[n++] = (struct pass){.kind = CLEAR, .round = round};
     if (!last) {
+        if (n_curls > 0 || clumps(fit->groom))
+            passes[n++] = (struct pass){.kind = REGROUP, .round = round};
         passes[n++] = (struct pass){.kind = CENTRE, .round = round};
         passes[n++] = (struct pass){.kind = RESHAPE, .round = round};
     }
@@ -195,10 +213,22 @@ static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST
 
 static uint32_t size_of(const struct groom_fit *fit, const struct pass *pass)
 {
-    if (pass->kind == LENGTHS || pass->kind == LAW || pass->kind == CENTRE || pass->kind == GUIDES || pass->kind == RESHAPE ||
-        pass->kind == CALIBRATE)
-        return 1;
-    return pass->kind == CURLS ? fit->groom->n_operator_guides : fit->n;
+    switch (pass->kind) {
+    case LENGTHS:
+    case LAW:
+    case REGROUP:
+    case CENTRE:
+    case GUIDES:
+    case RESHAPE:
+    case CALIBRATE: return 1;
+    case CURLS: return fit->groom->n_operator_guides;
+    case FOLLOW:
+    case STRANDS:
+    case STRAYS:
+    case POLISH:
+    case CLEAR: break;
+    }
+    return fit->n;
 }
 
 /* --- one step --------------------------------------------------------------------------------------- */
@@ -349,10 +379,12 @@ static uint32_t step_size(const struct groom_fit *fit, const struct pass *pass)
     switch (pass->kind) {
     case FOLLOW: values = 2 * CANDIDATES; break;
     case STRANDS: values = grid_of(fit, pass); break;
+    case STRAYS: values = STRAYS_VALUES; break;
     case CURLS: values = CURL_VALUES * fit->options.stages.randoms.strands; break;
     case POLISH: values = POLISH_VALUES; break;
     case LENGTHS:
     case LAW:
+    case REGROUP:
     case CENTRE:
     case GUIDES:
     case RESHAPE:
@@ -389,6 +421,7 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
     case STRANDS:
         random_search_strands(search, pass->active, fit->iteration, count, grid_of(fit, pass), HALVINGS, context);
         return GROOM_OK;
+    case STRAYS: return strays_settle(search, fit->iteration, count, context, diag);
     case CURLS: return search_curls(fit, search, pass, count, NULL, context, diag);
     case LAW: return restate_frequencies(fit, search, pass, context, diag);
     case POLISH:
@@ -398,6 +431,7 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
         return GROOM_OK;
     case CLEAR: return clear_head(fit, search, count, context, diag);
     case LENGTHS:
+    case REGROUP:
     case CENTRE:
     case GUIDES:
     case RESHAPE:
@@ -472,6 +506,7 @@ static groom_status pass_step(struct groom_fit *fit, const struct pass *pass, co
 {
     uint32_t count = step_size(fit, pass);
     groom_status st = pass->kind == CENTRE      ? centre_step(fit)
+                      : pass->kind == REGROUP   ? regroup(fit, weights_of(fit, pass), context, diag)
                       : pass->kind == LENGTHS   ? lengths_step(fit, pass, context, diag)
                       : pass->kind == GUIDES    ? guides_refine(fit, context, diag)
                       : pass->kind == RESHAPE   ? reshape_step(fit, context, diag)
