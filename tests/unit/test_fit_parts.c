@@ -124,6 +124,29 @@ START_TEST(the_objective_never_increases_and_no_cluster_is_empty)
 }
 END_TEST
 
+/* Clusters found in some columns: the others' means follow, and a cluster without rows keeps its centre. */
+START_TEST(means_follow_the_clusters_they_are_told)
+{
+    enum { N = 500, D = 7, K = 4 };
+    float *x = blobs(N, D, 5, 0.2f), centres[K * D];
+    double sum[K][D] = {{0}}, count[K] = {0};
+    uint32_t cluster_of[N];
+    for (int i = 0; i < N; i++) {
+        cluster_of[i] = (uint32_t)(i % (K - 1));
+        count[cluster_of[i]]++;
+        for (int d = 0; d < D; d++)
+            sum[cluster_of[i]][d] += (double)x[i * D + d];
+    }
+    for (int d = 0; d < D; d++)
+        centres[(K - 1) * D + d] = (float)d;
+    ck_ok(kmeans_means(x, N, D, K, cluster_of, centres, NULL, NULL));
+    for (int c = 0; c < K; c++)
+        for (int d = 0; d < D; d++)
+            ck_assert_float_eq(centres[c * D + d], c < K - 1 ? (float)(sum[c][d] / count[c]) : (float)d);
+    free(x);
+}
+END_TEST
+
 START_TEST(kmeans_gives_the_same_bits_for_one_thread_and_three)
 {
     enum { N = 3001, D = 31, K = 70 };
@@ -596,7 +619,7 @@ END_TEST
 
 TEST_SUITE("fit_parts", seeds_are_different_rows_and_cover_separate_blobs, seeding_stops_where_no_place_is_left,
            an_iteration_is_nearest_centre_then_mean,
-           the_objective_never_increases_and_no_cluster_is_empty,
+           the_objective_never_increases_and_no_cluster_is_empty, means_follow_the_clusters_they_are_told,
            kmeans_gives_the_same_bits_for_one_thread_and_three, kmeans_survives_each_failing_allocation,
            smoothing_is_the_steps_of_the_heat_equation, smoothing_keeps_the_root_and_the_tip_to_the_bit,
            smoothing_without_end_is_a_straight_line, smoothing_nothing_free_changes_nothing,
