@@ -28,6 +28,7 @@ struct regrouping {
     struct strand_state before;
     float *error, *other_error;  /* [n] */
     double (*shape)[3];          /* [m] scratch */
+    uint32_t *followers;         /* [n_gop] */
     struct account *account;     /* [trades.n] errors of strands that are asked */
     uint8_t *kept;               /* [trades.n] */
 };
@@ -132,16 +133,32 @@ static uint32_t other_of(const struct trade *trade, uint32_t guide)
     return guide == trade->spare ? trade->bundle : guide == trade->bundle ? trade->spare : guide;
 }
 
+static void count_followers(struct regrouping *r)
+{
+    memset(r->followers, 0, r->groom->n_operator_guides * sizeof *r->followers);
+    for (uint32_t i = 0; i < r->fit->n; i++)
+        r->followers[r->groom->operator_guide_of[i]]++;
+}
+
+/* A search knows the operator guides that strands follow: of no others may they be asked. */
+static int are_two(const struct regrouping *r, uint32_t trade)
+{
+    return r->followers[r->trades->trade[trade].bundle] > 0 && r->followers[r->trades->trade[trade].spare] > 0;
+}
+
+static int may_change(const struct regrouping *r, uint32_t at) { return !is_dispossessed(r, at) && are_two(r, r->trade_of[at]); }
+
 /* The better one of the bundle and the spare. */
 static void follow_better(struct regrouping *r, struct random_search *search, const struct groom_context *context)
 {
     uint32_t *follows = r->groom->operator_guide_of;
+    count_followers(r);
     for (uint32_t at = 0; at < r->n; at++)
-        if (!is_dispossessed(r, at))
+        if (may_change(r, at))
             follows[r->strand[at]] = other_of(trade_at(r, at), follows[r->strand[at]]);
     random_search_errors(search, r->n, r->other_error, context);
     for (uint32_t at = 0; at < r->n; at++)
-        if (!is_dispossessed(r, at) && !(r->other_error[at] < r->error[at]))
+        if (may_change(r, at) && !(r->other_error[at] < r->error[at]))
             follows[r->strand[at]] = other_of(trade_at(r, at), follows[r->strand[at]]);
     for (uint32_t t = 0; t < r->trades->n; t++)
         spare_guide_stand(r->groom, r->trades->trade[t].spare, r->shape);
@@ -174,8 +191,9 @@ static void judge(struct regrouping *r)
         r->account[r->trade_of[at]].before += (double)r->trades->error[r->strand[at]];
         r->account[r->trade_of[at]].after += (double)r->error[at];
     }
+    count_followers(r);
     for (uint32_t t = 0; t < r->trades->n; t++)
-        r->kept[t] = r->account[t].after < BETTER * r->account[t].before;
+        r->kept[t] = are_two(r, t) && r->account[t].after < BETTER * r->account[t].before;
 }
 
 static void put_back_numbers(struct regrouping *r, uint32_t guide)
@@ -213,9 +231,10 @@ static groom_status follow_who_was_asked(struct regrouping *r, const struct groo
     groom_status st = random_search_init(&search, r->fit, context, diag);
     if (st == GROOM_OK && !(strand && near))
         st = groom_fail(diag, GROOM_ENOMEM, "no memory for the strands of bundles");
+    count_followers(r);
     for (uint32_t i = 0; st == GROOM_OK && i < all; i++) {
         uint32_t guide = r->groom->operator_guide_of[i], trade = r->trades->of[guide];
-        if (trade == TRADES_NONE || !r->kept[trade])
+        if (trade == TRADES_NONE || !r->kept[trade] || !are_two(r, trade))
             continue;
         near[2 * n] = r->trades->trade[trade].bundle;
         near[2 * n + 1] = r->trades->trade[trade].spare;
@@ -257,9 +276,11 @@ static int allocate(struct regrouping *r, const struct groom_allocator *allocato
     r->error = memory_array(allocator, n, sizeof *r->error);
     r->other_error = memory_array(allocator, n, sizeof *r->other_error);
     r->shape = memory_array(allocator, r->fit->m, sizeof *r->shape);
+    r->followers = memory_array(allocator, n_op, sizeof *r->followers);
     r->account = memory_array_zero(allocator, n_trades, sizeof *r->account);
     r->kept = memory_array(allocator, n_trades, sizeof *r->kept);
-    return r->strand && r->trade_of && r->begin && r->member && r->error && r->other_error && r->shape && r->account && r->kept;
+    return r->strand && r->trade_of && r->begin && r->member && r->error && r->other_error && r->shape && r->followers &&
+           r->account && r->kept;
 }
 
 static void release(struct regrouping *r, const struct groom_allocator *allocator)
@@ -272,6 +293,7 @@ static void release(struct regrouping *r, const struct groom_allocator *allocato
     memory_release(allocator, r->error, n, sizeof *r->error);
     memory_release(allocator, r->other_error, n, sizeof *r->other_error);
     memory_release(allocator, r->shape, r->fit->m, sizeof *r->shape);
+    memory_release(allocator, r->followers, n_op, sizeof *r->followers);
     memory_release(allocator, r->account, n_trades, sizeof *r->account);
     memory_release(allocator, r->kept, n_trades, sizeof *r->kept);
     strand_state_finish(&r->before, allocator);
