@@ -211,7 +211,8 @@ static uint32_t list_passes(const struct groom_fit *fit, struct pass passes[MOST
     return n;
 }
 
-static uint32_t size_of(const struct groom_fit *fit, const struct pass *pass)
+/* What is done in one go, not strand by strand or curl by curl. */
+static int is_whole(const struct pass *pass)
 {
     switch (pass->kind) {
     case LENGTHS:
@@ -221,14 +222,13 @@ static uint32_t size_of(const struct groom_fit *fit, const struct pass *pass)
     case GUIDES:
     case RESHAPE:
     case CALIBRATE: return 1;
-    case CURLS: return fit->groom->n_operator_guides;
-    case FOLLOW:
-    case STRANDS:
-    case STRAYS:
-    case POLISH:
-    case CLEAR: break;
+    default: return 0;
     }
-    return fit->n;
+}
+
+static uint32_t size_of(const struct groom_fit *fit, const struct pass *pass)
+{
+    return is_whole(pass) ? 1 : pass->kind == CURLS ? fit->groom->n_operator_guides : fit->n;
 }
 
 /* --- one step --------------------------------------------------------------------------------------- */
@@ -375,21 +375,17 @@ static uint32_t grid_of(const struct groom_fit *fit, const struct pass *pass)
 /* Strands or operator guides of the next step. */
 static uint32_t step_size(const struct groom_fit *fit, const struct pass *pass)
 {
-    uint32_t values = 0, wanted, left = size_of(fit, pass) - fit->iteration;
+    uint32_t values = 1, wanted, left = size_of(fit, pass) - fit->iteration;
+    if (is_whole(pass))
+        return left;
     switch (pass->kind) {
     case FOLLOW: values = 2 * CANDIDATES; break;
     case STRANDS: values = grid_of(fit, pass); break;
     case STRAYS: values = STRAYS_VALUES; break;
     case CURLS: values = CURL_VALUES * fit->options.stages.randoms.strands; break;
     case POLISH: values = POLISH_VALUES; break;
-    case LENGTHS:
-    case LAW:
-    case REGROUP:
-    case CENTRE:
-    case GUIDES:
-    case RESHAPE:
-    case CALIBRATE: return left;
     case CLEAR: values = CLEAR_VALUES; break;
+    default: break;
     }
     wanted = STEP_WORK / values > 1 ? STEP_WORK / values : 1;
     return wanted < left ? wanted : left;

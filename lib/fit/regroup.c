@@ -14,7 +14,7 @@
 #define RUGGED_VALUES 40 /* where the error is rugged in it */
 #define HALVINGS 3
 
-struct account { double before, after; };
+struct account { double before, after, n; }; /* sums over strands, and how many these are */
 
 struct regrouping {
     struct groom_fit *fit;
@@ -40,8 +40,7 @@ static const struct trade *trade_at(const struct regrouping *r, uint32_t at) { r
 /* A strand that followed a spare: it is to follow another one. */
 static int was_spare(const struct regrouping *r, uint32_t strand)
 {
-    uint32_t guide = r->was->operator_guide_of[strand], trade = r->trades->of[guide];
-    return trade != TRADES_NONE && r->trades->trade[trade].spare == guide;
+    return trades_spare(r->trades, r->was->operator_guide_of[strand]);
 }
 
 static int is_dispossessed(const struct regrouping *r, uint32_t at) { return was_spare(r, r->strand[at]); }
@@ -90,14 +89,13 @@ static void hand_over(struct regrouping *r)
             r->groom->operator_guide_of[i] = r->trades->other[i];
     for (uint32_t at = 0; at < r->n; at++)
         if (!is_dispossessed(r, at)) {
-            struct account *account = &r->account[r->trade_of[at]]; /* their sum and number, for now */
-            account->before += (double)r->trades->error[r->strand[at]];
-            account->after++;
+            r->account[r->trade_of[at]].before += (double)r->trades->error[r->strand[at]];
+            r->account[r->trade_of[at]].n++;
         }
     for (uint32_t at = 0; at < r->n; at++) {
         const struct account *account = &r->account[r->trade_of[at]];
         uint32_t i = r->strand[at];
-        if (!is_dispossessed(r, at) && (double)r->trades->error[i] * account->after > account->before)
+        if (!is_dispossessed(r, at) && (double)r->trades->error[i] * account->n > account->before)
             r->groom->operator_guide_of[i] = trade_at(r, at)->spare;
     }
     for (uint32_t t = 0; t < r->trades->n; t++)

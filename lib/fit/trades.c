@@ -131,7 +131,7 @@ static void pair(struct choosing *c, uint32_t n_bundles)
     }
 }
 
-static int is_spare(const struct trades *t, uint32_t guide)
+int trades_spare(const struct trades *t, uint32_t guide)
 {
     return t->of[guide] != TRADES_NONE && t->trade[t->of[guide]].spare == guide;
 }
@@ -141,10 +141,10 @@ static void follow_who_stays(struct choosing *c)
 {
     struct trades *t = c->trades;
     for (uint32_t i = 0; i < c->groom->n_strands; i++) {
-        for (uint32_t k = 0; k < c->k && is_spare(t, t->other[i]); k++)
+        for (uint32_t k = 0; k < c->k && trades_spare(t, t->other[i]); k++)
             if (c->near[(size_t)i * c->k + k] != UINT32_MAX)
                 t->other[i] = c->near[(size_t)i * c->k + k];
-        if (is_spare(t, t->other[i]))
+        if (trades_spare(t, t->other[i]))
             t->other[i] = t->trade[t->of[t->other[i]]].bundle;
     }
 }

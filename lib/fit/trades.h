@@ -24,6 +24,8 @@ struct trades {
  * returns  GROOM_OK, GROOM_ENOMEM; finish it in any case */
 GROOM_MUST_CHECK groom_status trades_init(struct trades *trades, struct random_search *search,
                                           const struct groom_context *context, struct groom_diag *diag);
+/* Whether an operator guide is a trade's spare. */
+int trades_spare(const struct trades *trades, uint32_t guide);
 void trades_finish(struct trades *trades, const struct groom_allocator *allocator);
 
 #endif
