@@ -20,6 +20,7 @@
 #define AFAR_OPERATORS 96 /* the same where it stays in with these */
 #define AFAR 200
 #define TRIES 16         /* with other guides; in each, depth costs twice what it did in the one before */
+#define LENDERS 16       /* strands around one that stays in all the same, of which one after the other lends it what it has */
 #define CHUNK 4000       /* strands that are looked at together */
 #define STRANDS_PER_PIECE 16
 #define STEPS 3          /* of Newton */
@@ -163,20 +164,48 @@ static groom_status choose_guides(struct random_search *search, uint32_t n, uint
     return st;
 }
 
+/* What the strand next to each has, passing over the nearest ones that have lent. */
+static groom_status lend(struct random_search *search, uint32_t n, uint32_t n_lent, const struct groom_context *context,
+                         struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    struct groom *groom = search->fit->groom;
+    uint32_t k = lesser(n_lent + 2, groom->n_strands);
+    struct groom_neighbours *index = NULL;
+    struct near near;
+    groom_status st = near_init(&near, search, n, k, allocator, diag);
+    if (st == GROOM_OK)
+        st = groom_neighbours_create(groom->root_uv[0], groom->n_strands, 2, context, &index, diag);
+    if (st == GROOM_OK)
+        st = groom_neighbours_find(index, near.uv[0], n, k, near.candidate, NULL, context, diag);
+    for (uint32_t at = 0; st == GROOM_OK && at < n; at++) {
+        uint32_t lender = near.candidate[(size_t)at * k + k - 1];
+        if (lender != UINT32_MAX && lender != search->only[at])
+            strand_state_copy(groom, lender, search->only[at]);
+    }
+    groom_neighbours_destroy(index);
+    near_finish(&near, allocator);
+    return st;
+}
+
 /* What is deeper in the head than its target: from where it is; then, try by try, from other guides and on from there.
  * Planes beside the target tell little of where a strand far from it is in the head, so that the guides that promise most
- * may not keep what they promise, and others are tried. At last all that is in the head. */
+ * may not keep what they promise, and others are tried. Then as strands next to it are, which are out. At last all that is in
+ * the head. */
 struct way {
-    enum { NUDGED, BLENDED_ANEW, WITHDRAWN } kind;
+    enum { NUDGED, BLENDED_ANEW, LENT, WITHDRAWN } kind;
     uint32_t n_tries; /* before this one */
 };
-#define N_WAYS (1 + 2 * TRIES + 1)
+#define N_WAYS_BLENDED (1 + 2 * TRIES)
+#define N_WAYS (N_WAYS_BLENDED + LENDERS + 1)
 _Static_assert(TRIES <= RANDOM_SEARCH_SKIP + 1, "a try passes over those of all before it");
 
 static struct way way_at(uint32_t k)
 {
     if (k + 1 == N_WAYS)
         return (struct way){WITHDRAWN, 0};
+    if (k >= N_WAYS_BLENDED)
+        return (struct way){LENT, k - N_WAYS_BLENDED};
     return (struct way){k % 2 ? BLENDED_ANEW : NUDGED, k < 2 ? 0 : (k - 1) / 2};
 }
 
@@ -198,6 +227,8 @@ static groom_status take(struct way way, struct random_search *search, uint32_t 
     search->out_of_head = way.kind == WITHDRAWN;
     if (way.kind == BLENDED_ANEW)
         st = blend_anew(search, n, way.n_tries, context, diag);
+    if (way.kind == LENT)
+        st = lend(search, n, way.n_tries, context, diag);
     if (st == GROOM_OK)
         random_search_polish(search, 0, n, STEPS, HOLD, 1, context);
     return st;
