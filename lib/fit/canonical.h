@@ -3,7 +3,8 @@
  * The model leans on the axes: noise shifts strands along x, y and z, bends and curls begin at directions that are
  * taken off them (model/frames.h). Its parameters mean the same in any frame, its random numbers do not: the same
  * hair turned is, to the statistics that parameters are told by, the same hair with other random numbers, which moves
- * those that the strands hardly tell by a fifth. So these statistics are taken in the hair's own frame. */
+ * those that the strands hardly tell by a fifth. So these statistics begin in the hair's own frame, and tell in which one
+ * they end (axes.h). */
 #ifndef FIT_CANONICAL_H
 #define FIT_CANONICAL_H
 

@@ -175,6 +175,8 @@ static void pen_state(struct pen *pen, struct groom_fit *fit)
     pen_u32(pen, &fit->stage);
     pen_u32(pen, &fit->phase);
     pen_u32(pen, &fit->iteration);
+    pen_bytes(pen, fit->frame, sizeof fit->frame);
+    pen_u32(pen, &fit->axes);
     pen_u32(pen, &fit->n_guides);
     if (fit->n_guides > 0)
         pen_clusters(pen, fit);
@@ -253,9 +255,18 @@ static int sound_report(const struct groom_fit_report *report)
     return sound;
 }
 
+static int sound_axes(const struct groom_fit *fit)
+{
+    int sound = fit->axes <= AXES_NEAR;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            sound &= fabs(fit->frame[i][j]) <= 1.001;
+    return sound;
+}
+
 static int sound_state(const struct groom_fit *fit)
 {
-    if (!sound_report(&fit->report) || fit->stage > FIT_N_STAGES)
+    if (!sound_report(&fit->report) || fit->stage > FIT_N_STAGES || !sound_axes(fit))
         return 0;
     if (fit->n_guides > 0 && (!indices_below(fit->cluster_of, fit->n, fit->n_guides) ||
                               !all_finite(fit->centroids[0], (size_t)fit->n_guides * fit->m * 3)))

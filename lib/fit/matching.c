@@ -16,6 +16,9 @@
 struct matching {
     const struct groom_allocator *allocator;
     struct groom *groom;              /* of the sub-sample, with random numbers of its own */
+    float (*guides)[3], (*roots)[3];  /* its own, in the fit's frame */
+    double turn[3][3];                /* of the axes that it lies along, from there */
+    int is_turned;
     struct groom_strands *evaluated;  /* its strands, as they come */
     float (*points)[3];               /* the same resampled as the target was */
     float (*base)[3], (*guide)[3];
@@ -25,6 +28,7 @@ struct matching {
     struct moments_plan plan;
 };
 
+static size_t guide_points(const struct groom *groom) { return (size_t)groom->n_guides * groom->n_vertices; }
 static size_t points_of(const struct matching *matching) { return 2 * (size_t)matching->plan.n_pairs * matching->plan.m; }
 
 /* --- pairs ------------------------------------------------------------------------------ */
@@ -136,13 +140,18 @@ static groom_status stratify(float *u, uint32_t n, int uniform, const struct gro
     return GROOM_OK;
 }
 
-static groom_status stratify_operators(struct groom *groom, const struct groom_allocator *allocator,
-                                       struct groom_diag *diag)
+/* Curls that were found are the target's own, of which many strands tell; what is matched are then the same waves, not others
+ * of their kind. Numbers that single strands were found to have hold what guides are wrong by, and are drawn. */
+static int keeps_numbers(const struct groom_operator *op, int known) { return known && op->type == GROOM_OPERATOR_CURL; }
+
+static groom_status draw_numbers(struct groom *groom, int known, const struct groom_allocator *allocator, struct groom_diag *diag)
 {
     for (uint32_t o = 0; o < groom->n_operators; o++) {
         struct groom_operator *op = &groom->operators[o];
         uint32_t n_randoms, n = groom_operator_random_per_guide(op->type) ? groom->n_operator_guides : groom->n_strands;
         const struct groom_operator_random *randoms = groom_operator_randoms(op->type, &n_randoms);
+        if (keeps_numbers(op, known))
+            continue;
         groom_draw_random(groom, op, FIT_OWN_SEED);
         for (uint32_t r = 0; r < n_randoms; r++)
             if (stratify(op->random[r], n, randoms[r].minimum == 0, allocator) != GROOM_OK)
@@ -176,11 +185,48 @@ static groom_status allocate(struct matching *matching, const struct groom_conte
 }
 
 /* The statistics know no axes, the model does; and floats are finest near the middle of the hair. */
-static void move_groom(struct groom *groom, const struct groom_fit *fit)
+static groom_status move_groom(struct matching *matching, const struct groom_fit *fit, struct groom_diag *diag)
 {
-    size_t n_points = (size_t)groom->n_guides * groom->n_vertices;
+    struct groom *groom = matching->groom;
+    size_t n_points = guide_points(groom);
     canonical_move(fit->frame, fit->centre, groom->guides, n_points);
     canonical_move(fit->frame, fit->centre, groom->roots, groom->n_strands);
+    matching->guides = memory_array(matching->allocator, n_points, sizeof *matching->guides);
+    matching->roots = memory_array(matching->allocator, groom->n_strands, sizeof *matching->roots);
+    if (!matching->guides || !matching->roots)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory for a sample of %u strands", groom->n_strands);
+    memcpy(matching->guides, groom->guides, n_points * sizeof *matching->guides);
+    memcpy(matching->roots, groom->roots, groom->n_strands * sizeof *matching->roots);
+    return GROOM_OK;
+}
+
+/* NULL: back to the fit's frame. */
+static void turn_groom(struct matching *matching, const double turn[3][3])
+{
+    static const float origin[3] = {0, 0, 0};
+    struct groom *groom = matching->groom;
+    size_t n_points = guide_points(groom);
+    if (turn || matching->is_turned) {
+        memcpy(groom->guides, matching->guides, n_points * sizeof *groom->guides);
+        memcpy(groom->roots, matching->roots, groom->n_strands * sizeof *groom->roots);
+    }
+    matching->is_turned = turn != NULL;
+    if (!turn)
+        return;
+    memcpy(matching->turn, turn, sizeof matching->turn);
+    canonical_move(turn, origin, groom->guides, n_points);
+    canonical_move(turn, origin, groom->roots, groom->n_strands);
+}
+
+/* Strands that were evaluated along turned axes. */
+static void turn_back(struct matching *matching)
+{
+    double back[3][3];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            back[i][j] = matching->turn[j][i];
+    if (matching->is_turned)
+        canonical_move((const double (*)[3])back, (const float[3]){0, 0, 0}, matching->points, points_of(matching));
 }
 
 static groom_status make_base(struct matching *matching, const struct groom_context *context, struct groom_diag *diag)
@@ -206,33 +252,65 @@ static uint32_t peak_of(const double target[MOMENTS_COUNT])
     return best;
 }
 
-/* The target's statistics and their covariance. */
-static groom_status measure_target(struct matching *matching, const struct groom_fit *fit, const uint32_t *strand, double floor,
-                                   const struct groom_context *context, struct groom_diag *diag)
+static void take_target(struct matching *matching, const struct groom_fit *fit, const uint32_t *strand)
 {
-    uint32_t m = fit->m, n_pairs = matching->plan.n_pairs;
-    for (uint32_t i = 0; i < 2 * n_pairs; i++)
+    uint32_t m = fit->m;
+    for (uint32_t i = 0; i < 2 * matching->plan.n_pairs; i++)
         for (uint32_t j = 0; j < m; j++)
             for (int c = 0; c < 3; c++)
                 matching->points[(size_t)i * m + j][c] = fit->target[(size_t)strand[i] * m + j][c] * fit->scale;
     canonical_move(fit->frame, (const float[3]){0, 0, 0}, matching->points, points_of(matching));
+}
+
+static void measure_target(struct matching *matching, const struct groom_context *context)
+{
     for (int round = 0; round < 3; round++) { /* each with the levels, then the peak's phase, that were found before */
         moments_measure(&matching->plan, (const float (*)[3])matching->points, matching->values, context);
-        moments_mean(matching->values, n_pairs, matching->target);
+        moments_mean(matching->values, matching->plan.n_pairs, matching->target);
         memcpy(matching->plan.level, matching->target + MOMENTS_SPECTRUM, sizeof matching->plan.level);
         matching->plan.centroid = matching->target[MOMENTS_CENTROID];
         matching->plan.peak = round == 0 ? peak_of(matching->target) : matching->plan.peak;
         matching->plan.phase = round > 0 ? matching->target[MOMENTS_PHASE] : 0;
     }
-    return moments_covariance(matching->values, n_pairs, matching->groom->operator_guide_of,
-                              matching->groom->n_operator_guides, matching->target, floor, matching->cholesky, context, diag);
 }
 
-groom_status matching_create(const struct groom_fit *fit, uint32_t n_pairs, double floor, const struct groom_context *context,
+static groom_status simulate(struct matching *matching, const struct groom_context *context, struct groom_diag *diag)
+{
+    struct groom *groom = matching->groom;
+    groom_status st = groom_evaluate(groom, 0, groom->n_strands, matching->evaluated->points, context, diag);
+    if (st == GROOM_OK)
+        st = groom_strands_resample(matching->evaluated, matching->plan.m, matching->points, context, diag);
+    if (st == GROOM_OK) {
+        turn_back(matching);
+        moments_measure(&matching->plan, (const float (*)[3])matching->points, matching->values, context);
+    }
+    return st;
+}
+
+/* values: the target's. Of these alone, or, by pairs, of how far they are from simulated ones. */
+static groom_status find_covariance(struct matching *matching, double floor, int by_pairs, const struct groom_context *context,
+                                    struct groom_diag *diag)
+{
+    size_t n = (size_t)matching->plan.n_pairs * MOMENTS_COUNT;
+    float *difference = memory_array(matching->allocator, n, sizeof *difference);
+    if (!difference)
+        return groom_fail(diag, GROOM_ENOMEM, "no memory to compare %u pairs of strands", matching->plan.n_pairs);
+    memcpy(difference, matching->values, n * sizeof *difference);
+    groom_status st = by_pairs ? simulate(matching, context, diag) : GROOM_OK;
+    for (size_t v = 0; by_pairs && st == GROOM_OK && v < n; v++)
+        difference[v] -= matching->values[v];
+    if (st == GROOM_OK)
+        st = moments_covariance(difference, matching->plan.n_pairs, matching->groom->operator_guide_of,
+                                matching->groom->n_operator_guides, matching->target, floor, matching->cholesky, context, diag);
+    memory_release(matching->allocator, difference, n, sizeof *difference);
+    return st;
+}
+
+groom_status matching_create(const struct groom_fit *fit, const struct matching_wanted *wanted, const struct groom_context *context,
                              struct matching **out, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
-    uint32_t n = n_pairs < fit->n ? n_pairs : fit->n;
+    uint32_t n = wanted->n_pairs < fit->n ? wanted->n_pairs : fit->n;
     struct matching *matching = memory_array_zero(allocator, 1, sizeof *matching);
     uint32_t *strand = memory_array(allocator, n, 2 * sizeof *strand);
     groom_status st = matching && strand ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to match operators");
@@ -246,11 +324,14 @@ groom_status matching_create(const struct groom_fit *fit, uint32_t n_pairs, doub
     if ((st = choose_pairs(fit, n, strand, context, diag)) != GROOM_OK ||
         (st = groom_select(fit->groom, strand, 2 * n, context, &matching->groom, diag)) != GROOM_OK)
         goto out;
-    move_groom(matching->groom, fit);
-    if ((st = stratify_operators(matching->groom, allocator, diag)) != GROOM_OK ||
+    if ((st = move_groom(matching, fit, diag)) != GROOM_OK ||
+        (st = draw_numbers(matching->groom, wanted->known, allocator, diag)) != GROOM_OK ||
         (st = allocate(matching, context, diag)) != GROOM_OK ||
-        (st = make_base(matching, context, diag)) != GROOM_OK ||
-        (st = measure_target(matching, fit, strand, floor, context, diag)) != GROOM_OK)
+        (st = make_base(matching, context, diag)) != GROOM_OK)
+        goto out;
+    take_target(matching, fit, strand);
+    measure_target(matching, context);
+    if ((st = find_covariance(matching, wanted->floor, wanted->by_pairs, context, diag)) != GROOM_OK)
         goto out;
     *out = matching;
     matching = NULL;
@@ -271,23 +352,25 @@ void matching_destroy(struct matching *matching)
     memory_release(allocator, matching->guide, n_points, sizeof *matching->guide);
     memory_release(allocator, matching->values, matching->plan.n_pairs, MOMENTS_COUNT * sizeof *matching->values);
     memory_release(allocator, matching->cholesky, MOMENTS_COUNT, MOMENTS_COUNT * sizeof *matching->cholesky);
+    if (matching->groom) {
+        memory_release(allocator, matching->guides, guide_points(matching->groom), sizeof *matching->guides);
+        memory_release(allocator, matching->roots, matching->groom->n_strands, sizeof *matching->roots);
+    }
     groom_strands_destroy(matching->evaluated);
     groom_destroy(matching->groom);
     memory_release(allocator, matching, 1, sizeof *matching);
 }
 
-groom_status matching_residual(struct matching *matching, const struct groom_operator *operators,
-                               double residual[MOMENTS_COUNT], const struct groom_context *context,
-                               struct groom_diag *diag)
+groom_status matching_residual(struct matching *matching, const struct groom_operator *operators, const double turn[3][3],
+                               double residual[MOMENTS_COUNT], const struct groom_context *context, struct groom_diag *diag)
 {
     struct groom *groom = matching->groom;
-    groom_status st;
     for (uint32_t o = 0; o < groom->n_operators; o++)
         memcpy(groom->operators[o].parameter, operators[o].parameter, sizeof operators[o].parameter);
-    if ((st = groom_evaluate(groom, 0, groom->n_strands, matching->evaluated->points, context, diag)) != GROOM_OK ||
-        (st = groom_strands_resample(matching->evaluated, matching->plan.m, matching->points, context, diag)) != GROOM_OK)
+    turn_groom(matching, turn);
+    groom_status st = simulate(matching, context, diag);
+    if (st != GROOM_OK)
         return st;
-    moments_measure(&matching->plan, (const float (*)[3])matching->points, matching->values, context);
     moments_mean(matching->values, matching->plan.n_pairs, residual);
     for (int f = 0; f < MOMENTS_COUNT; f++)
         residual[f] -= matching->target[f];

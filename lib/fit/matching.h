@@ -7,14 +7,20 @@
 
 struct matching;
 
+struct matching_wanted {
+    uint32_t n_pairs; /* at most as many as there are strands */
+    double floor;     /* of the statistics' standard deviations: moments_covariance */
+    int known;        /* whether the groom's curls were found */
+    int by_pairs;     /* whether the parameters that there are are near: pairs of the target are then compared with the same
+                       * pairs as they are simulated, whose roots and base strands tell how far they are apart */
+};
+
 /* Pairs of neighbouring strands: strands drawn fairly, each with its nearest neighbour on the scalp that is
  * no duplicate of it. The groom's random numbers are replaced by the quantiles of their ranks, so that what
- * is simulated has the spread that the operators mean, not that of one draw; they stay the same for all
- * parameters (common random numbers). A function of the fit's state alone.
- * n_pairs  wanted; at most as many as there are strands
- * floor    of the statistics' standard deviations: moments_covariance
+ * is simulated has the spread that the operators mean, not that of one draw; those of curls that were found are
+ * kept. They stay the same for all parameters (common random numbers). A function of the fit's state alone.
  * returns  GROOM_OK, GROOM_ENOMEM. Owned by the caller */
-GROOM_MUST_CHECK groom_status matching_create(const struct groom_fit *fit, uint32_t n_pairs, double floor,
+GROOM_MUST_CHECK groom_status matching_create(const struct groom_fit *fit, const struct matching_wanted *wanted,
                                               const struct groom_context *context, struct matching **matching,
                                               struct groom_diag *diag);
 void matching_destroy(struct matching *matching); /* takes NULL */
@@ -22,11 +28,12 @@ void matching_destroy(struct matching *matching); /* takes NULL */
 /* How far the statistics of the groom with these operators are from the target's, as independent numbers
  * of variance 1 where the operators are right (with guides that are right, too).
  * operators  of the fit's groom, of which the parameters are read
+ * turn       of the axes that they lie along, against the fit's frame: rows are the new ones in it; NULL: none
  * residual   [MOMENTS_COUNT] out
  * returns    GROOM_OK, GROOM_ENOMEM
  * threads    same bits for any pool */
 GROOM_MUST_CHECK groom_status matching_residual(struct matching *matching, const struct groom_operator *operators,
-                                                double residual[MOMENTS_COUNT], const struct groom_context *context,
-                                                struct groom_diag *diag);
+                                                const double turn[3][3], double residual[MOMENTS_COUNT],
+                                                const struct groom_context *context, struct groom_diag *diag);
 
 #endif

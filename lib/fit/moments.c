@@ -23,8 +23,13 @@
 #define POWER_FLOOR 1e-5        /* of squared segments: a wobble of 3e-3 rad; rounding is far below it */
 #define DISTANCE_FLOOR 1e-8     /* of squared lengths */
 #define SHRINKAGE 0.1           /* of correlations */
-#define GUIDE_FLOOR 10.0               /* times the floor, for statistics that lean on base strands and operator guides: they only
-                                 keep clumps from where nothing else speaks */
+
+/* Times the floor, for statistics that lean on */
+#define BASE_FLOOR 5.0    /* base strands: what these do not share with their neighbours is smoothed away, and they are a few per
+                           * cent too close; */
+#define GUIDE_FLOOR 10.0  /* base strands and operator guides: they only keep clumps from where nothing else speaks; */
+#define BORDER_FLOOR 30.0 /* which strands are of two bundles: one that was given to the wrong one is as far from its neighbour as
+                           * a clump is wide, or as near */
 
 /* --- the plan ------------------------------------------------------------------------ */
 
@@ -417,7 +422,14 @@ static int is_deviation(int f)
            (f >= MOMENTS_STRETCH && f < MOMENTS_ASIDE);
 }
 
-static int leans_on_guides(int f) { return f >= MOMENTS_GUIDE_DISTANCE || f == MOMENTS_LENGTH || f == MOMENTS_LENGTH + 2; }
+static double leaning(int f)
+{
+    if (f >= MOMENTS_GUIDE_DISTANCE || f == MOMENTS_LENGTH || f == MOMENTS_LENGTH + 2)
+        return GUIDE_FLOOR;
+    if (f >= MOMENTS_BORDER && f < MOMENTS_STRETCH)
+        return BORDER_FLOOR;
+    return f >= MOMENTS_DISTANCE && f < MOMENTS_BORDER ? BASE_FLOOR : 1;
+}
 
 /* Variances of the means from sums over bundles; values become deviations of standard size. */
 static void standardize(float *values, uint32_t n_pairs, const uint32_t *bundle, uint32_t n_bundles,
@@ -444,12 +456,12 @@ static void standardize(float *values, uint32_t n_pairs, const uint32_t *bundle,
 }
 
 groom_status moments_covariance(float *values, uint32_t n_pairs, const uint32_t *bundle, uint32_t n_bundles,
-                                const double mean[MOMENTS_COUNT], double floor, double *cholesky,
+                                const double size[MOMENTS_COUNT], double floor, double *cholesky,
                                 const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     int n = MOMENTS_COUNT;
-    double variance[MOMENTS_COUNT];
+    double mean[MOMENTS_COUNT], variance[MOMENTS_COUNT];
     double *sums = memory_array(allocator, n_bundles, sizeof *sums);
     float *correlation = memory_array(allocator, (size_t)n * (size_t)n, sizeof *correlation);
     groom_status st = GROOM_OK;
@@ -459,6 +471,7 @@ groom_status moments_covariance(float *values, uint32_t n_pairs, const uint32_t 
     }
     if ((st = blas_prepare(context, diag)) != GROOM_OK)
         goto out;
+    moments_mean(values, n_pairs, mean);
     standardize(values, n_pairs, bundle, n_bundles, mean, sums, variance);
     cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, n, n, (int)n_pairs, 1, values, n, values, n, 0, correlation, n);
     for (int f = 0; f < n; f++)
@@ -466,7 +479,7 @@ groom_status moments_covariance(float *values, uint32_t n_pairs, const uint32_t 
             double *c = &cholesky[(size_t)f * (size_t)n + (size_t)g];
             *c = (1 - SHRINKAGE) * (double)correlation[(size_t)f * (size_t)n + (size_t)g] * sqrt(variance[f] * variance[g]);
             if (f == g)
-                *c = variance[f] + pow(floor * (leans_on_guides(f) ? GUIDE_FLOOR : 1) * (is_deviation(f) ? mean[f] : 1), 2) + 1e-12;
+                *c = variance[f] + pow(floor * leaning(f) * (is_deviation(f) ? size[f] : 1), 2) + 1e-12;
         }
     if (!dense_cholesky(cholesky, (uint32_t)n))
         st = groom_fail(diag, GROOM_EINTERNAL, "the covariance of the strands' statistics is not positive definite");

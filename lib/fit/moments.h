@@ -85,16 +85,20 @@ void moments_measure(const struct moments_plan *plan, const float (*points)[3], 
 /* Means over pairs, NANs left out; 0 where there is nothing but NANs. */
 void moments_mean(const float *values, uint32_t n_pairs, double mean[MOMENTS_COUNT]);
 
-/* The covariance of the means, of which bundles are the independent draws: per-pair correlations, shrunk,
- * with variances of sums over bundles and a floor, as its Cholesky factor.
- * floor     how finely the model is taken to tell a statistic, as a standard deviation: of logarithms and
- *           shares as it is, of absolute deviations as a part of them
- * values    [n_pairs][MOMENTS_COUNT]; NANs become the mean
- * bundle    [n_pairs] 0..n_bundles-1
- * cholesky  [MOMENTS_COUNT][MOMENTS_COUNT] lower triangle
- * returns   GROOM_OK, GROOM_ENOMEM, GROOM_EINTERNAL (not positive definite: cannot be) */
+/* The covariance of the means, of which bundles are the independent draws: per-pair correlations, shrunk, with variances of
+ * sums over bundles and a floor, as its Cholesky factor. Of differences between two sets of strands of the same base
+ * strands, what these scatter by cancels: it is the operators' random numbers that are left.
+ * values      [n_pairs][MOMENTS_COUNT] or their differences; NANs become the mean, and all become deviations from it
+ * bundle      [n_pairs] 0..n_bundles-1
+ * size        [MOMENTS_COUNT] of the statistics themselves
+ * floor       how finely the model is taken to tell a statistic, as a standard deviation: of logarithms and
+ *             shares as it is, of absolute deviations as a part of their size; more where base strands and
+ *             guides have a say
+ * cholesky    [MOMENTS_COUNT][MOMENTS_COUNT] lower triangle
+ * returns     GROOM_OK, GROOM_ENOMEM, GROOM_EINTERNAL (not positive definite: cannot be) */
 GROOM_MUST_CHECK groom_status moments_covariance(float *values, uint32_t n_pairs, const uint32_t *bundle,
-                                                 uint32_t n_bundles, const double mean[MOMENTS_COUNT], double floor,
-                                                 double *cholesky,                                                 const struct groom_context *context, struct groom_diag *diag);
+                                                 uint32_t n_bundles, const double size[MOMENTS_COUNT], double floor,
+                                                 double *cholesky, const struct groom_context *context,
+                                                 struct groom_diag *diag);
 
 #endif

@@ -6,7 +6,8 @@
  * common random numbers, they are moved until some 180 statistics of the strands agree with the target's
  * (moments.h), by their covariance. First the frequencies look around for a better valley, then Levenberg and
  * Marquardt's steps go down it. The statistics begin as coarse ones, of which the large differences decide,
- * and are taken more finely from step to step. The paper's losses, before and after, are the yardstick.
+ * and are taken more finely from step to step; once they are fine, they tell along which axes the hair was made
+ * (axes.h). The paper's losses, before and after, are the yardstick.
  *
  * method "paper" is the paper's own, as a reference (paper_operators.h). */
 #include <math.h>
@@ -14,6 +15,7 @@
 
 #include "base/memory.h"
 #include "base/progress.h"
+#include "fit/axes.h"
 #include "fit/dense.h"
 #include "fit/gather.h"
 #include "fit/gradient_determinant.h"
@@ -39,6 +41,9 @@ enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 #define FLOOR_RATIO 0.5
 #define FLOOR_LAST 0.01
 #define SEARCH_SHARE 3         /* one pair in so many */
+#define AXES_FLOOR 0.011       /* of the statistics in the step before which the hair's axes are chosen */
+#define LAST_LOOK 4            /* steps before the last, in which they are chosen again */
+#define FARTHEST_TURN 0.5      /* of these in one step, radians */
 #define PROBE 0.03             /* step of a finite difference of a frequency's logarithm or a fraction of a strand */
 #define PROBE_SIZE 0.1         /* of the logarithm of a size: wide, so that rounding of strands does not show in a slope */
 #define LONGEST_STEP 0.7       /* of a parameter in one step of refinement */
@@ -49,7 +54,7 @@ enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 #define CONVERGED 1e-3       /* share of the misfit that a step must gain, while guides are rough; */
 #define CONVERGED_LAST 1e-5  /* when they are known: valleys are flat, and what stops on their sides remembers its way */
 #define STEPS_AT_HAND 4      /* by the same slopes, near the minimum */
-#define MOST_PARAMETERS (GROOM_FIT_MAX_OPERATORS * GROOM_OPERATOR_MAX_PARAMETERS)
+#define MOST_PARAMETERS (GROOM_FIT_MAX_OPERATORS * GROOM_OPERATOR_MAX_PARAMETERS + 3)
 
 /* --- parameters --------------------------------------------------------------------------- */
 
@@ -135,12 +140,14 @@ static void write_unknown(const struct unknown *unknown, double x)
 /* The fit's operators with parameters of their own, to be tried. */
 struct trial {
     struct groom_operator operators[GROOM_FIT_MAX_OPERATORS];
+    float turn[3];  /* of the axes that they lie along, against the fit's frame: a rotation vector */
     struct unknown unknowns[MOST_PARAMETERS];
     uint32_t n_operators, n_unknowns;
 };
 
-static void trial_init_for(const struct groom_fit *fit, int frequencies_known, struct trial *trial)
+static void trial_init_known(const struct groom_fit *fit, int frequencies_known, struct trial *trial)
 {
+    memset(trial->turn, 0, sizeof trial->turn);
     trial->n_operators = fit->groom->n_operators;
     if (trial->n_operators) /* of none there is no array to copy */
         memcpy(trial->operators, fit->groom->operators, trial->n_operators * sizeof *trial->operators);
@@ -148,12 +155,29 @@ static void trial_init_for(const struct groom_fit *fit, int frequencies_known, s
                                       mean_guide_length(fit->groom), trial->unknowns);
 }
 
-static void trial_init(const struct groom_fit *fit, struct trial *trial) { trial_init_for(fit, 0, trial); }
+static void trial_init(const struct groom_fit *fit, struct trial *trial)
+{
+    trial_init_known(fit, 0, trial);
+    for (int k = 0; fit->axes == AXES_NEAR && k < 3; k++)
+        trial->unknowns[trial->n_unknowns++] = (struct unknown){&trial->turn[k], -FARTHEST_TURN, FARTHEST_TURN, 0, 0, 0, 0};
+}
+
+static int is_turned(const struct trial *trial) { return trial->turn[0] != 0 || trial->turn[1] != 0 || trial->turn[2] != 0; }
+
+static void turn_of(const struct trial *trial, double turn[3][3])
+{
+    axes_rotation((const double[3]){trial->turn[0], trial->turn[1], trial->turn[2]}, turn);
+}
 
 static void trial_keep(const struct trial *trial, struct groom_fit *fit)
 {
     for (uint32_t o = 0; o < trial->n_operators; o++)
         memcpy(fit->groom->operators[o].parameter, trial->operators[o].parameter, sizeof trial->operators[o].parameter);
+    if (is_turned(trial)) {
+        double turn[3][3];
+        turn_of(trial, turn);
+        axes_turn(fit, (const double (*)[3])turn);
+    }
 }
 
 static uint32_t count_unknowns(const struct groom_fit *fit)
@@ -173,6 +197,14 @@ static double square_of(const double residual[MOMENTS_COUNT])
     return sum;
 }
 
+static groom_status residual_of(struct matching *matching, const struct trial *trial, double residual[MOMENTS_COUNT],
+                                const struct groom_context *context, struct groom_diag *diag)
+{
+    double turn[3][3];
+    turn_of(trial, turn);
+    return matching_residual(matching, trial->operators, is_turned(trial) ? (const double (*)[3])turn : NULL, residual, context, diag);
+}
+
 static groom_status misfit(struct matching *matching, const struct trial *trial, double *square,
                            const struct groom_context *context, struct groom_diag *diag)
 {
@@ -180,7 +212,7 @@ static groom_status misfit(struct matching *matching, const struct trial *trial,
     *square = INFINITY;
     if (progress_cancelled(context))
         return groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage operators");
-    groom_status st = matching_residual(matching, trial->operators, residual, context, diag);
+    groom_status st = residual_of(matching, trial, residual, context, diag);
     *square = square_of(residual);
     return st;
 }
@@ -222,7 +254,7 @@ static groom_status probe(struct matching *matching, struct trial *trial, uint32
         return groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage operators");
     write_unknown(unknown, x + move);
     *moved = read_unknown(unknown) - x;
-    groom_status st = *moved != 0 ? matching_residual(matching, trial->operators, residual, context, diag) : GROOM_OK;
+    groom_status st = *moved != 0 ? residual_of(matching, trial, residual, context, diag) : GROOM_OK;
     *unknown->value = kept;
     return st;
 }
@@ -305,7 +337,7 @@ static groom_status descend(struct matching *matching, struct trial *here, const
         if (!solve_step(jacobian, residual, here->n_unknowns, dampings[d], step))
             continue;
         take_step(here, start, step);
-        groom_status st = matching_residual(matching, here->operators, other, context, diag);
+        groom_status st = residual_of(matching, here, other, context, diag);
         if (st != GROOM_OK)
             return st;
         if (square_of(other) < *square) {
@@ -329,7 +361,7 @@ static groom_status refine(struct matching *matching, struct trial *here, int bo
     groom_status st = GROOM_OK;
     if (!jacobian)
         return groom_fail(diag, GROOM_ENOMEM, "no memory to refine operators");
-    if ((st = matching_residual(matching, here->operators, residual, context, diag)) != GROOM_OK ||
+    if ((st = residual_of(matching, here, residual, context, diag)) != GROOM_OK ||
         (st = differentiate(matching, here, residual, both_sides, jacobian, context, diag)) != GROOM_OK)
         goto out;
     before = last = *square = square_of(residual);
@@ -351,10 +383,12 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequ
     struct trial here;
     double square;
     int ended = 0;
-    trial_init_for(fit, frequencies_known, &here);
+    trial_init_known(fit, frequencies_known, &here);
     if (here.n_unknowns == 0 || fit->n < FEWEST_STRANDS)
         return GROOM_OK;
-    groom_status st = matching_create(fit, fit->options.stages.operators.pairs, FLOOR_LAST, context, &matching, diag);
+    /* along other axes, the curls that were found are not the target's */
+    struct matching_wanted wanted = {fit->options.stages.operators.pairs, FLOOR_LAST, fit->axes == AXES_GIVEN, 1};
+    groom_status st = matching_create(fit, &wanted, context, &matching, diag);
     if (st != GROOM_OK)
         return st;
     for (uint32_t k = 0, last = 0; st == GROOM_OK && !last && k < n_steps; k++) {
@@ -510,12 +544,30 @@ static groom_status search_step(struct groom_fit *fit, struct matching *matching
     return GROOM_OK;
 }
 
+static groom_status choose_axes(struct groom_fit *fit, int *moved, const struct groom_context *context, struct groom_diag *diag)
+{
+    double before[3][3];
+    memcpy(before, fit->frame, sizeof before);
+    groom_status st = axes_choose(fit, (fit->options.stages.operators.pairs + SEARCH_SHARE - 1) / SEARCH_SHARE, context, diag);
+    *moved = memcmp(before, fit->frame, sizeof before) != 0;
+    return st;
+}
+
+/* Once statistics are fine enough to tell, and once more before the end: what was told along wrong axes tells less. */
+static groom_status axes_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    int moved, last_look = fit->iteration + LAST_LOOK == fit->options.stages.operators.refinements;
+    if (fit->phase != REFINE || floor_of(fit) > AXES_FLOOR || (fit->axes != AXES_UNKNOWN && !last_look))
+        return GROOM_OK;
+    return choose_axes(fit, &moved, context, diag);
+}
+
 static groom_status refine_step(struct groom_fit *fit, struct matching *matching, const struct groom_context *context,
                                 struct groom_diag *diag)
 {
     struct trial here;
     double square = 0;
-    int converged = 0;
+    int converged = 0, moved = 0, last = fit->iteration + 1 >= fit->options.stages.operators.refinements;
     trial_init(fit, &here);
     groom_status st = refine(matching, &here, 0, 1, CONVERGED, &square, &converged, context, diag);
     if (st == GROOM_OK && converged && floor_of(fit) <= FLOOR_LAST) /* at the minimum, as one side has it */
@@ -523,22 +575,46 @@ static groom_status refine_step(struct groom_fit *fit, struct matching *matching
     if (st != GROOM_OK)
         return st;
     trial_keep(&here, fit);
+    converged &= fit->axes != AXES_UNKNOWN && floor_of(fit) <= FLOOR_LAST;
+    if (converged && !last && (st = choose_axes(fit, &moved, context, diag)) != GROOM_OK)
+        return st;
     report_progress(&fit->report, "operators", "misfit", square, count_unknowns(fit) + fit->iteration, context);
-    if (++fit->iteration >= fit->options.stages.operators.refinements || (converged && floor_of(fit) <= FLOOR_LAST)) {
+    fit->iteration++;
+    if (last || (converged && !moved)) {
         fit->phase = AFTER;
         fit->iteration = 0;
     }
     return GROOM_OK;
 }
 
-static groom_status match_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+static groom_status try_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     struct matching *matching;
-    groom_status st = matching_create(fit, pairs_of(fit), floor_of(fit), context, &matching, diag);
+    groom_status st = axes_step(fit, context, diag);
     if (st != GROOM_OK)
+        return st;
+    struct matching_wanted wanted = {.n_pairs = pairs_of(fit), .floor = floor_of(fit)};
+    if ((st = matching_create(fit, &wanted, context, &matching, diag)) != GROOM_OK)
         return st;
     st = fit->phase == SEARCH ? search_step(fit, matching, context, diag) : refine_step(fit, matching, context, diag);
     matching_destroy(matching);
+    return st;
+}
+
+/* Nothing has changed where it fails. */
+static groom_status match_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    struct trial before;
+    double frame[3][3];
+    uint32_t axes = fit->axes;
+    trial_init_known(fit, 0, &before);
+    memcpy(frame, fit->frame, sizeof frame);
+    groom_status st = try_step(fit, context, diag);
+    if (st != GROOM_OK) {
+        trial_keep(&before, fit);
+        memcpy(fit->frame, frame, sizeof frame);
+        fit->axes = axes;
+    }
     return st;
 }
 

@@ -12,6 +12,10 @@
  * how well a fit goes is no lottery. (The paper's own gradient steps go by the options'.) */
 #define FIT_OWN_SEED 1u
 
+/* What is known of the axes that hair was made along: nothing yet; they are the file's; these by quarter turns; they are near
+ * the frame. */
+enum fit_axes { AXES_UNKNOWN, AXES_GIVEN, AXES_QUARTER, AXES_NEAR };
+
 struct groom_fit {
     const struct groom_allocator *allocator;
     struct groom_fit_options options;
@@ -27,7 +31,6 @@ struct groom_fit {
     struct head_plane *head_plane; /* [n * head_planes_of(m)] the head beside the target (head_planes.h); NULL without one */
     float centre[3];           /* of all points, metres */
     float scale;               /* metres: root mean square distance of all points from the centre */
-    double frame[3][3];        /* the hair's own axes, rows (canonical.h) */
     float ordinary;            /* size of this scalp over that of an ordinary one: 1 for real hair in metres */
     struct {                   /* every strand of the capture, where cameras see some only (unseen.h); else 0 */
         uint32_t n;
@@ -40,6 +43,8 @@ struct groom_fit {
     uint32_t n_guides;                /* 0 until clusters are seeded */
     float (*centroids)[3];            /* [n_guides * m] of clusters, not smoothed, in the target's frame */
     uint32_t *cluster_of;             /* [n] */
+    double frame[3][3];               /* rows: axes along which operators are matched (axes.h); the hair's own to begin with */
+    uint32_t axes;                    /* enum fit_axes: what is known of them */
     struct groom *groom;              /* NULL until there are guides */
     uint32_t n_moments;               /* of a gradient descent under way: see fit/adam.h; 0: there is none */
     float *moments;                   /* [n_moments] */
