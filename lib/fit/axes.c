@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/progress.h"
 #include "fit/matching.h"
 #include "geometry/vec.h"
 
@@ -93,6 +94,8 @@ static groom_status misfit_along(struct matching *matching, const struct groom_f
                                  const struct groom_context *context, struct groom_diag *diag)
 {
     double turn[3][3], residual[MOMENTS_COUNT];
+    if (progress_cancelled(context))
+        return groom_fail(diag, GROOM_ECANCELLED, "cancelled while the hair's axes were looked for");
     multiply(frame, (const double (*)[3])fit->frame, 1, turn);
     groom_status st = matching_residual(matching, fit->groom->operators, (const double (*)[3])turn, residual, context, diag);
     *square = 0;
@@ -114,7 +117,7 @@ groom_status axes_choose(struct groom_fit *fit, uint32_t n_pairs, const struct g
 {
     double frame[QUARTERS + HAIRS][3][3], square[QUARTERS + HAIRS];
     struct matching_wanted wanted = {.n_pairs = n_pairs, .floor = FLOOR};
-    struct matching *matching;
+    struct matching *matching = NULL;
     groom_status st = matching_create(fit, &wanted, context, &matching, diag);
     list_quarters(frame);
     list_hairs((const double (*)[3])fit->frame, frame + QUARTERS);

@@ -14,7 +14,7 @@
  * are: the file's own, where they are about as good as any; these by quarter turns, where another axis was up; or those of
  * the hair as it falls (canonical.h), from where they are looked for along with the parameters.
  * n_pairs  that tell
- * returns  GROOM_OK, GROOM_ENOMEM; the fit is untouched on error */
+ * returns  GROOM_OK, GROOM_ENOMEM, GROOM_ECANCELLED; the fit is untouched on error */
 GROOM_MUST_CHECK groom_status axes_choose(struct groom_fit *fit, uint32_t n_pairs, const struct groom_context *context,
                                           struct groom_diag *diag);
 

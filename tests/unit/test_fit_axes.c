@@ -5,6 +5,7 @@
 
 #include "fit/axes.h"
 #include "fit/matching.h"
+#include "groom/context.h"
 #include "tests/support/guides.h"
 #include "tests/support/invariance.h"
 #include "tests/support/known.h"
@@ -127,6 +128,35 @@ START_TEST(axes_of_hair_that_lies_askew_are_looked_for)
 }
 END_TEST
 
+START_TEST(a_choice_that_fails_changes_nothing)
+{
+    struct groom_sample *sample;
+    struct groom_fit *fit = fit_of(GROOM_SAMPLE_STRAIGHT, invariance_as_it_is, "operators", &sample);
+    double before[3][3];
+    groom_status st = GROOM_ENOMEM;
+    uint32_t n_failed = 0;
+    memcpy(before, fit->frame, sizeof before);
+    for (size_t fail_at = 0; st == GROOM_ENOMEM; fail_at += 1 + fail_at / 16) {
+        struct test_failing_allocator state;
+        struct groom_allocator allocator;
+        test_failing_allocator_init(&state, fail_at, &allocator);
+        struct groom_context context = {.allocator = &allocator};
+        st = axes_choose(fit, PAIRS / 10, &context, NULL);
+        ck_assert_uint_eq(state.outstanding_bytes, 0);
+        if (st == GROOM_ENOMEM) {
+            n_failed++;
+            ck_assert_mem_eq(fit->frame, before, sizeof before);
+            ck_assert_uint_eq(fit->axes, AXES_UNKNOWN);
+        }
+    }
+    ck_assert_int_eq(st, GROOM_OK);
+    ck_assert_uint_gt(n_failed, 20);
+    ck_assert_uint_ne(fit->axes, AXES_UNKNOWN);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
 /* --- turned operators -------------------------------------------------------------------------------- */
 
 /* A turn is undone by none, and what is turned all the way round is where it was. */
@@ -158,4 +188,5 @@ END_TEST
 
 TEST_SUITE("fit_axes", a_quarter_turn_about_z, a_rotation_leaves_its_axis_and_turns_by_its_length,
            axes_of_straight_hair_are_found_as_it_lies, axes_of_bent_hair_are_found_as_it_lies,
-           waves_are_found_which_axis_was_up, axes_of_hair_that_lies_askew_are_looked_for, operators_are_matched_along_turned_axes)
+           waves_are_found_which_axis_was_up, axes_of_hair_that_lies_askew_are_looked_for, a_choice_that_fails_changes_nothing,
+           operators_are_matched_along_turned_axes)
