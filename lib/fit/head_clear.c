@@ -164,13 +164,13 @@ static groom_status choose_guides(struct random_search *search, uint32_t n, uint
     return st;
 }
 
-/* What the strand next to each has, passing over the nearest ones that have lent. */
-static groom_status lend(struct random_search *search, uint32_t n, uint32_t n_lent, const struct groom_context *context,
-                         struct groom_diag *diag)
+/* The strand next to each, passing over the nearest n_lent; itself where there is none. lender [n] */
+static groom_status find_lenders(const struct random_search *search, uint32_t n, uint32_t n_lent, uint32_t *lender,
+                                 const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
-    struct groom *groom = search->fit->groom;
-    uint32_t k = lesser(n_lent + 2, groom->n_strands);
+    const struct groom *groom = search->fit->groom;
+    uint32_t k = lesser(n_lent + 2, groom->n_strands); /* of which the first is the strand itself */
     struct groom_neighbours *index = NULL;
     struct near near;
     groom_status st = near_init(&near, search, n, k, allocator, diag);
@@ -179,18 +179,36 @@ static groom_status lend(struct random_search *search, uint32_t n, uint32_t n_le
     if (st == GROOM_OK)
         st = groom_neighbours_find(index, near.uv[0], n, k, near.candidate, NULL, context, diag);
     for (uint32_t at = 0; st == GROOM_OK && at < n; at++) {
-        uint32_t lender = near.candidate[(size_t)at * k + k - 1];
-        if (lender != UINT32_MAX && lender != search->only[at])
-            strand_state_copy(groom, lender, search->only[at]);
+        uint32_t farthest = near.candidate[(size_t)at * k + k - 1];
+        lender[at] = farthest == UINT32_MAX ? search->only[at] : farthest;
     }
     groom_neighbours_destroy(index);
     near_finish(&near, allocator);
     return st;
 }
 
+/* All that these have of their own, to the strands of the search. */
+static groom_status lend(struct random_search *search, uint32_t n, uint32_t n_lent, const struct groom_context *context,
+                         struct groom_diag *diag)
+{
+    const struct groom_allocator *allocator = memory_allocator(context);
+    struct groom *groom = search->fit->groom;
+    struct strand_state lent = {0};
+    uint32_t *lender = memory_array(allocator, n, sizeof *lender);
+    groom_status st = lender ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to look for strands that are out");
+    if (st == GROOM_OK && (st = find_lenders(search, n, n_lent, lender, context, diag)) == GROOM_OK)
+        st = strand_state_init(&lent, groom, lender, 0, n, allocator, diag);
+    lent.strand = search->only;
+    for (uint32_t at = 0; st == GROOM_OK && at < n; at++)
+        strand_state_give_back(&lent, groom, at);
+    strand_state_finish(&lent, allocator);
+    memory_release(allocator, lender, n, sizeof *lender);
+    return st;
+}
+
 /* What is deeper in the head than its target: from where it is; then, try by try, from other guides and on from there.
  * Planes beside the target tell little of where a strand far from it is in the head, so that the guides that promise most
- * may not keep what they promise, and others are tried. Then as strands next to it are, which are out. At last all that is in
+ * may not keep what they promise, and others are tried. Then what strands next to it have of their own. At last all that is in
  * the head. */
 struct way {
     enum { NUDGED, BLENDED_ANEW, LENT, WITHDRAWN } kind;

@@ -12,7 +12,8 @@ struct head_left {
 
 /* Strands first .. first + count - 1 that are in the head take Newton's steps with a stiff price on depth. Those that are
  * deeper in than the deepest of their targets come out at any cost, if need be by another operator guide near them and
- * blended from other guides: those around them, then those farther off, one after the other, at an ever stiffer price.
+ * blended from other guides: those around them, then those farther off, one after the other, at an ever stiffer price; at
+ * last with all that a strand next to them has of its own.
  * Those that follow their targets in come out only where they are about as near to these as they were. What does not come
  * out has its own back: a groom has no vertices of single strands.
  * search   of the fit's groom; its weights are those of its last pass

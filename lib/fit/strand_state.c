@@ -59,14 +59,3 @@ void strand_state_give_back(const struct strand_state *state, struct groom *groo
         if (strand_state_draws(&groom->operators[o]))
             groom->operators[o].random[0][i] = state->number[(size_t)at * state->n_operators + o];
 }
-
-void strand_state_copy(struct groom *groom, uint32_t from, uint32_t to)
-{
-    size_t k = groom->n_instancing;
-    memcpy(groom->instancing_guide + to * k, groom->instancing_guide + from * k, k * sizeof *groom->instancing_guide);
-    memcpy(groom->instancing_weight + to * k, groom->instancing_weight + from * k, k * sizeof *groom->instancing_weight);
-    groom->operator_guide_of[to] = groom->operator_guide_of[from];
-    for (uint32_t o = 0; o < groom->n_operators; o++)
-        if (strand_state_draws(&groom->operators[o]))
-            groom->operators[o].random[0][to] = groom->operators[o].random[0][from];
-}

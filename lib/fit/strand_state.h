@@ -28,7 +28,4 @@ void strand_state_finish(struct strand_state *state, const struct groom_allocato
 void strand_state_keep(struct strand_state *state, const struct groom *groom, uint32_t at);
 void strand_state_give_back(const struct strand_state *state, struct groom *groom, uint32_t at);
 
-/* Strand `to` gets all that strand `from` has of its own. */
-void strand_state_copy(struct groom *groom, uint32_t from, uint32_t to);
-
 #endif
