@@ -1,8 +1,9 @@
 /* The axes that hair was made along.
  *
  * Noise shifts strands along three axes, and bends and curls begin at directions that are taken off them: turned against
- * these, hair is of another kind. A quarter of the statistics tell so, and sharply: off by 15 degrees they are ten times
- * as far from the target as random numbers explain, and parameters that are told along wrong axes are off by 5 to 20 %.
+ * these, hair is of another kind. The statistics tell so, sharply where hair falls: off by 15 degrees, straight, wavy and
+ * bent hair is 4 to 15 times as far from its target; coily and short hair tells less. Parameters that are told along wrong
+ * axes are off by 5 to 20 %.
  * Hair from the model lies along the axes of its file, unless somebody has turned it: then along none that a file
  * could name. Hair that was captured lies along none at all, and any do. */
 #ifndef FIT_AXES_H

@@ -287,23 +287,30 @@ static groom_status simulate(struct matching *matching, const struct groom_conte
     return st;
 }
 
-/* values: the target's. Of these alone, or, by pairs, of how far they are from simulated ones. */
-static groom_status find_covariance(struct matching *matching, double floor, int by_pairs, const struct groom_context *context,
-                                    struct groom_diag *diag)
+/* values: the target's, then how far they are from simulated ones. */
+static groom_status take_off_simulated(struct matching *matching, const struct groom_context *context, struct groom_diag *diag)
 {
     size_t n = (size_t)matching->plan.n_pairs * MOMENTS_COUNT;
-    float *difference = memory_array(matching->allocator, n, sizeof *difference);
-    if (!difference)
+    float *target = memory_array(matching->allocator, n, sizeof *target);
+    if (!target)
         return groom_fail(diag, GROOM_ENOMEM, "no memory to compare %u pairs of strands", matching->plan.n_pairs);
-    memcpy(difference, matching->values, n * sizeof *difference);
-    groom_status st = by_pairs ? simulate(matching, context, diag) : GROOM_OK;
-    for (size_t v = 0; by_pairs && st == GROOM_OK && v < n; v++)
-        difference[v] -= matching->values[v];
-    if (st == GROOM_OK)
-        st = moments_covariance(difference, matching->plan.n_pairs, matching->groom->operator_guide_of,
-                                matching->groom->n_operator_guides, matching->target, floor, matching->cholesky, context, diag);
-    memory_release(matching->allocator, difference, n, sizeof *difference);
+    memcpy(target, matching->values, n * sizeof *target);
+    groom_status st = simulate(matching, context, diag);
+    for (size_t v = 0; st == GROOM_OK && v < n; v++)
+        matching->values[v] = target[v] - matching->values[v];
+    memory_release(matching->allocator, target, n, sizeof *target);
     return st;
+}
+
+/* values: the target's. */
+static groom_status find_covariance(struct matching *matching, const struct matching_wanted *wanted,
+                                    const struct groom_context *context, struct groom_diag *diag)
+{
+    groom_status st = wanted->by_pairs ? take_off_simulated(matching, context, diag) : GROOM_OK;
+    if (st != GROOM_OK)
+        return st;
+    return moments_covariance(matching->values, matching->plan.n_pairs, matching->groom->operator_guide_of,
+                              matching->groom->n_operator_guides, matching->target, wanted->floor, matching->cholesky, context, diag);
 }
 
 groom_status matching_create(const struct groom_fit *fit, const struct matching_wanted *wanted, const struct groom_context *context,
@@ -331,7 +338,7 @@ groom_status matching_create(const struct groom_fit *fit, const struct matching_
         goto out;
     take_target(matching, fit, strand);
     measure_target(matching, context);
-    if ((st = find_covariance(matching, wanted->floor, wanted->by_pairs, context, diag)) != GROOM_OK)
+    if ((st = find_covariance(matching, wanted, context, diag)) != GROOM_OK)
         goto out;
     *out = matching;
     matching = NULL;

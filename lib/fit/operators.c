@@ -502,11 +502,15 @@ static double floor_of(const struct groom_fit *fit)
     return fit->phase == SEARCH ? FLOOR_FIRST : fmax(FLOOR_FIRST * pow(FLOOR_RATIO, fit->iteration), FLOOR_LAST);
 }
 
-/* Where a frequency looks for its valley, some of the pairs tell. */
+/* Tell where a frequency's valley is, and along which axes hair was made. */
+static uint32_t some_pairs(const struct groom_fit *fit)
+{
+    return (fit->options.stages.operators.pairs + SEARCH_SHARE - 1) / SEARCH_SHARE;
+}
+
 static uint32_t pairs_of(const struct groom_fit *fit)
 {
-    uint32_t pairs = fit->options.stages.operators.pairs;
-    return fit->phase == SEARCH ? (pairs + SEARCH_SHARE - 1) / SEARCH_SHARE : pairs;
+    return fit->phase == SEARCH ? some_pairs(fit) : fit->options.stages.operators.pairs;
 }
 
 static void begin(struct groom_fit *fit)
@@ -548,7 +552,7 @@ static groom_status choose_axes(struct groom_fit *fit, int *moved, const struct 
 {
     double before[3][3];
     memcpy(before, fit->frame, sizeof before);
-    groom_status st = axes_choose(fit, (fit->options.stages.operators.pairs + SEARCH_SHARE - 1) / SEARCH_SHARE, context, diag);
+    groom_status st = axes_choose(fit, some_pairs(fit), context, diag);
     *moved = memcmp(before, fit->frame, sizeof before) != 0;
     return st;
 }
