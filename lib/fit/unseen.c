@@ -155,6 +155,7 @@ static groom_status make_whole(const struct groom_fit *fit, struct groom **out, 
         return st;
     memcpy(groom->name, from->name, sizeof groom->name);
     groom->scalp = from->scalp;
+    memcpy(groom->axes, from->axes, sizeof groom->axes);
     memcpy(groom->roots, fit->all.roots, fit->all.n * sizeof *groom->roots);
     memcpy(groom->root_uv, fit->all.root_uv, fit->all.n * sizeof *groom->root_uv);
     memcpy(groom->guides, from->guides, (size_t)from->n_guides * from->n_vertices * sizeof *groom->guides);

@@ -46,9 +46,8 @@ LANES_INLINE void curl_vertices(const struct kernel_inputs *in, const lanes *res
         lanes *q = y + 3 * j;
         vec_sincos_halves(vec_at_most(vec_load(at[j]) * rate + shift, 2.0f * MANY_TURNS), &sine, &cosine);
         vec along_n = vec_load(size[j]) * sine, along_b = vec_load(size[j]) * cosine;
-        vec_store(q[0], vec_load(p[0]) + (along_n * vec_load(frame[0]) + along_b * vec_load(frame[2])));
-        vec_store(q[1], vec_load(p[1]) + (along_n * vec_load(frame[1]) + along_b * vec_load(frame[3])));
-        vec_store(q[2], vec_load(p[2]) + along_b * vec_load(frame[4]));
+        for (int c = 0; c < 3; c++)
+            vec_store(q[c], vec_load(p[c]) + (along_n * vec_load(frame[c]) + along_b * vec_load(frame[3 + c])));
     }
 }
 
@@ -85,14 +84,15 @@ LANES_INLINE void curl_backward(const struct kernel_inputs *in, const lanes *res
             float size = radius * growth * begun;
             lane_sincos_turns(at_most(at[j][l] * rate[l] + shift[l], MANY_TURNS), &sine, &cosine);
             float dx = dp[0][l], dy = dp[1][l], dz = dp[2][l];
-            float on_n = dx * frame[0][l] + dy * frame[1][l];
-            float on_b = dx * frame[2][l] + dy * frame[3][l] + dz * frame[4][l];
+            float on_n = dx * frame[0][l] + dy * frame[1][l] + dz * frame[2][l];
+            float on_b = dx * frame[3][l] + dy * frame[4][l] + dz * frame[5][l];
             float along_n = size * sine, along_b = size * cosine;
             d_frame[0][l] += along_n * dx;
             d_frame[1][l] += along_n * dy;
-            d_frame[2][l] += along_b * dx;
-            d_frame[3][l] += along_b * dy;
-            d_frame[4][l] += along_b * dz;
+            d_frame[2][l] += along_n * dz;
+            d_frame[3][l] += along_b * dx;
+            d_frame[4][l] += along_b * dy;
+            d_frame[5][l] += along_b * dz;
 
             float d_size = sine * on_n + cosine * on_b;
             float d_turn = TWO_PI * (along_b * on_n - along_n * on_b);

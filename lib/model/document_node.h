@@ -68,6 +68,12 @@ groom_status document_layer_read(const cJSON *node, uint32_t index, const struct
 groom_status document_layer_write(const struct groom *groom, const struct groom_operator *op,
                                   const struct groom_array_keeper *keeper, cJSON *node);
 
+/* --- axes (document_axes.c) -------------------------------------------------------- */
+
+/* Of a document that has them. */
+groom_status document_axes_read(const cJSON *root, struct groom *groom, struct groom_diag *diag);
+groom_status document_axes_write(const float axes[3][3], cJSON *root);
+
 /* --- a base (document_base.c) ------------------------------------------------------ */
 
 /* The groom of a document that has a "base": strands alone, without its chain. */

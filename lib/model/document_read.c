@@ -406,6 +406,7 @@ static groom_status read_groom(struct reader *reader, const struct groom_context
     groom_status status;
     if ((status = read_format(reader)) != GROOM_OK || (status = read_source(reader, context, &groom)) != GROOM_OK ||
         (status = read_name(reader, groom)) != GROOM_OK || (status = read_scalp(reader, groom)) != GROOM_OK ||
+        (status = document_axes_read(reader->root, groom, reader->diag)) != GROOM_OK ||
         (status = read_operators(reader, groom)) != GROOM_OK ||
         (status = groom_validate(groom, reader->diag)) != GROOM_OK)
         goto out;

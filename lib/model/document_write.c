@@ -5,6 +5,7 @@
 
 #include "groom/document.h"
 #include "model/document_node.h"
+#include "model/model.h"
 
 struct writer {
     cJSON *root;
@@ -162,7 +163,7 @@ groom_status groom_document_operator_write(const struct groom *groom, uint32_t i
 static int is_model_member(const char *name)
 {
     static const char *const members[] = {"format",     "unit",            "name",     "strands", "guides",
-                                          "instancing", "operator_guides", "operators", "base"};
+                                          "instancing", "operator_guides", "operators", "base", "axes"};
     for (size_t i = 0; i < sizeof members / sizeof members[0]; i++)
         if (strcmp(name, members[i]) == 0)
             return 1;
@@ -218,6 +219,8 @@ groom_status groom_document_write(const struct groom *groom, const char *around,
     need(&writer, cJSON_AddStringToObject(writer.root, "unit", "m"));
     need(&writer, cJSON_AddStringToObject(writer.root, "name", groom->name));
     keep_other_members(&writer, others);
+    if (model_axes(groom) && writer.status == GROOM_OK)
+        note(&writer, document_axes_write(model_axes(groom), writer.root));
     write_strands(&writer, groom);
     if (groom->base && writer.status == GROOM_OK) {
         note(&writer, document_base_write(groom, keeper, writer.root));

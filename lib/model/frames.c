@@ -22,10 +22,44 @@ static struct vec plus(struct vec a, struct vec b) { return (struct vec){a.x + b
 
 static struct vec times(double s, struct vec a) { return (struct vec){s * a.x, s * a.y, s * a.z}; }
 
-static struct vec between(const float from[3], const float to[3])
+/* --- axes ------------------------------------------------------------------ */
+
+/* A vector of space as it lies along the axes. */
+static struct vec along(const float (*axes)[3], struct vec v)
 {
-    return (struct vec){(double)to[0] - from[0], (double)to[1] - from[1], (double)to[2] - from[2]};
+    if (!axes)
+        return v;
+    return (struct vec){axes[0][0] * v.x + axes[0][1] * v.y + axes[0][2] * v.z,
+                        axes[1][0] * v.x + axes[1][1] * v.y + axes[1][2] * v.z,
+                        axes[2][0] * v.x + axes[2][1] * v.y + axes[2][2] * v.z};
 }
+
+/* ... and back. */
+static struct vec in_space(const float (*axes)[3], struct vec v)
+{
+    if (!axes)
+        return v;
+    return (struct vec){axes[0][0] * v.x + axes[1][0] * v.y + axes[2][0] * v.z,
+                        axes[0][1] * v.x + axes[1][1] * v.y + axes[2][1] * v.z,
+                        axes[0][2] * v.x + axes[1][2] * v.y + axes[2][2] * v.z};
+}
+
+static struct vec between(const float (*axes)[3], const float from[3], const float to[3])
+{
+    return along(axes, (struct vec){(double)to[0] - from[0], (double)to[1] - from[1], (double)to[2] - from[2]});
+}
+
+static struct vec read_along(const float (*axes)[3], const float v[3]) { return along(axes, (struct vec){v[0], v[1], v[2]}); }
+
+static void write_in_space(const float (*axes)[3], struct vec v, float out[3])
+{
+    struct vec w = in_space(axes, v);
+    out[0] = (float)w.x;
+    out[1] = (float)w.y;
+    out[2] = (float)w.z;
+}
+
+/* --- directions ------------------------------------------------------------ */
 
 /* Unit vector along v, and 1 / |v|; (0, 1, 0) and 0 where v has no length. */
 static struct vec direction_of(struct vec v, double *inverse)
@@ -41,9 +75,10 @@ static struct vec direction_backward(struct vec u, double inverse, struct vec d_
     return times(inverse, plus(d_u, times(-dot(u, d_u), u)));
 }
 
-static void add_difference(struct vec d, float from[3], float to[3])
+static void add_difference(const float (*axes)[3], struct vec d, float from[3], float to[3])
 {
-    const double v[3] = {d.x, d.y, d.z};
+    struct vec w = in_space(axes, d);
+    const double v[3] = {w.x, w.y, w.z};
     for (int c = 0; c < 3; c++) {
         to[c] += (float)v[c];
         from[c] -= (float)v[c];
@@ -65,12 +100,12 @@ struct curl_frame {
     double inverse_level;  /* 1 / |(tau.x, tau.y)|, 0 near +-z */
 };
 
-LANES_INLINE struct curl_frame curl_frame_at(const float (*guide)[3], uint32_t m, uint32_t j)
+LANES_INLINE struct curl_frame curl_frame_at(const float (*guide)[3], uint32_t m, const float (*axes)[3], uint32_t j)
 {
     struct curl_frame f;
     uint32_t from, to;
     tangent_ends(m, j, &from, &to);
-    f.tangent = direction_of(between(guide[from], guide[to]), &f.inverse_length);
+    f.tangent = direction_of(between(axes, guide[from], guide[to]), &f.inverse_length);
     double x = f.tangent.x, y = f.tangent.y;
     f.inverse_level = fabs(x) + fabs(y) < NEAR_Z ? 0.0 : 1.0 / sqrt(x * x + y * y);
     f.normal = f.inverse_level > 0.0 ? times(f.inverse_level, (struct vec){y, -x, 0.0}) : (struct vec){1.0, 0.0, 0.0};
@@ -78,32 +113,29 @@ LANES_INLINE struct curl_frame curl_frame_at(const float (*guide)[3], uint32_t m
     return f;
 }
 
-void frames_curl(const float (*guide)[3], uint32_t m, float *frame)
+void frames_curl(const float (*guide)[3], uint32_t m, const float (*axes)[3], float *frame)
 {
     for (uint32_t j = 0; j < m; j++, frame += FRAME_WIDTH) {
-        struct curl_frame f = curl_frame_at(guide, m, j);
-        frame[0] = (float)f.normal.x;
-        frame[1] = (float)f.normal.y;
-        frame[2] = (float)f.binormal.x;
-        frame[3] = (float)f.binormal.y;
-        frame[4] = (float)f.binormal.z;
+        struct curl_frame f = curl_frame_at(guide, m, axes, j);
+        write_in_space(axes, f.normal, frame);
+        write_in_space(axes, f.binormal, frame + 3);
     }
 }
 
-void frames_curl_backward(const float (*guide)[3], uint32_t m, const float *d_frame, float (*d_guide)[3])
+void frames_curl_backward(const float (*guide)[3], uint32_t m, const float (*axes)[3], const float *d_frame, float (*d_guide)[3])
 {
     for (uint32_t j = 0; j < m; j++, d_frame += FRAME_WIDTH) {
-        struct curl_frame f = curl_frame_at(guide, m, j);
-        struct vec d_binormal = {d_frame[2], d_frame[3], d_frame[4]};
+        struct curl_frame f = curl_frame_at(guide, m, axes, j);
+        struct vec d_binormal = read_along(axes, d_frame + 3);
         struct vec d_tangent = cross(f.normal, d_binormal);
-        struct vec d_normal = plus((struct vec){d_frame[0], d_frame[1], 0.0}, cross(d_binormal, f.tangent));
+        struct vec d_normal = plus(read_along(axes, d_frame), cross(d_binormal, f.tangent));
         d_normal.z = 0.0; /* the normal stays level */
         struct vec d_level = direction_backward(f.normal, f.inverse_level, d_normal);
         d_tangent.y += d_level.x;
         d_tangent.x -= d_level.y;
         uint32_t from, to;
         tangent_ends(m, j, &from, &to);
-        add_difference(direction_backward(f.tangent, f.inverse_length, d_tangent), d_guide[from], d_guide[to]);
+        add_difference(axes, direction_backward(f.tangent, f.inverse_length, d_tangent), d_guide[from], d_guide[to]);
     }
 }
 
@@ -114,10 +146,10 @@ struct bend_frame {
     double inverse_length, inverse_cross;
 };
 
-static struct bend_frame bend_frame_of(const float (*guide)[3])
+static struct bend_frame bend_frame_of(const float (*guide)[3], const float (*axes)[3])
 {
     struct bend_frame f;
-    f.e = direction_of(between(guide[0], guide[1]), &f.inverse_length);
+    f.e = direction_of(between(axes, guide[0], guide[1]), &f.inverse_length);
     f.auxiliary = fabs(f.e.y) < NEAR_LEVEL ? (struct vec){0.0, 1.0, 0.0} : (struct vec){1.0, 0.0, 0.0};
     struct vec across = cross(f.e, f.auxiliary);
     f.v = direction_of(across, &f.inverse_cross);
@@ -125,20 +157,19 @@ static struct bend_frame bend_frame_of(const float (*guide)[3])
     return f;
 }
 
-void frames_bend(const float (*guide)[3], float *axis)
+void frames_bend(const float (*guide)[3], const float (*axes)[3], float *axis)
 {
-    struct bend_frame f = bend_frame_of(guide);
-    const double values[AXIS_WIDTH] = {f.v.x, f.v.y, f.v.z, f.w.x, f.w.y, f.w.z};
-    for (int i = 0; i < AXIS_WIDTH; i++)
-        axis[i] = (float)values[i];
+    struct bend_frame f = bend_frame_of(guide, axes);
+    write_in_space(axes, f.v, axis);
+    write_in_space(axes, f.w, axis + 3);
 }
 
-void frames_bend_backward(const float (*guide)[3], const float *d_axis, float (*d_guide)[3])
+void frames_bend_backward(const float (*guide)[3], const float (*axes)[3], const float *d_axis, float (*d_guide)[3])
 {
-    struct bend_frame f = bend_frame_of(guide);
-    struct vec d_v = {d_axis[0], d_axis[1], d_axis[2]}, d_w = {d_axis[3], d_axis[4], d_axis[5]};
+    struct bend_frame f = bend_frame_of(guide, axes);
+    struct vec d_v = read_along(axes, d_axis), d_w = read_along(axes, d_axis + 3);
     struct vec d_e = cross(f.v, d_w);
     d_v = plus(d_v, cross(d_w, f.e));
     d_e = plus(d_e, cross(f.auxiliary, direction_backward(f.v, f.inverse_cross, d_v)));
-    add_difference(direction_backward(f.e, f.inverse_length, d_e), d_guide[0], d_guide[1]);
+    add_difference(axes, direction_backward(f.e, f.inverse_length, d_e), d_guide[0], d_guide[1]);
 }

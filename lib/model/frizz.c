@@ -1,5 +1,6 @@
 /* Frizz: noise along each strand (Chang et al. 2025, Appendix A; the noise itself: model/noise.h).
- *   chi_j = omega s_j + 10 u (s_j: arc length),  x~_j = x_j + alpha/2 epsilon(chi_j), not at the root. */
+ *   chi_j = omega s_j + 10 u (s_j: arc length),  x~_j = x_j + alpha/2 epsilon(chi_j), not at the root.
+ * epsilon's coordinates are along the groom's axes. */
 #include "model/arc.h"
 #include "model/kernel.h"
 #include "model/noise.h"
@@ -49,6 +50,15 @@ LANES_INLINE vec noise_cubic(const struct noise_place *place, uint32_t skip)
     return c[0] + f * (c[1] + f * (c[2] + f * c[3]));
 }
 
+/* x~ = x + alpha/2 (what the axes make of epsilon). */
+LANES_INLINE void shift_vertex(const float (*axes)[3], float half, const vec epsilon[3], const lanes *restrict p, lanes *restrict q)
+{
+    for (int c = 0; c < 3; c++) {
+        vec shift = axes ? axes[0][c] * epsilon[0] + axes[1][c] * epsilon[1] + axes[2][c] * epsilon[2] : epsilon[c];
+        vec_store(q[c], vec_load(p[c]) + half * shift);
+    }
+}
+
 /* All vertices are near. */
 LANES_INLINE void frizz_near(const struct kernel_inputs *in, const lanes *restrict x, const lanes *restrict at,
                              lanes *restrict y)
@@ -56,12 +66,9 @@ LANES_INLINE void frizz_near(const struct kernel_inputs *in, const lanes *restri
     float frequency = in->parameter[FREQUENCY], half = 0.5f * in->parameter[AMPLITUDE];
     vec shift = RANDOM_SHIFT * vec_load(in->random[0]);
     for (uint32_t j = 1; j < in->m; j++) {
-        const lanes *p = x + 3 * j;
-        lanes *q = y + 3 * j;
         struct noise_place place = noise_place_of(in->noise, frequency * vec_load(at[j]) + shift);
-        vec_store(q[0], vec_load(p[0]) + half * noise_cubic(&place, 0));
-        vec_store(q[1], vec_load(p[1]) + half * noise_cubic(&place, NOISE_OFFSET_Y));
-        vec_store(q[2], vec_load(p[2]) + half * noise_cubic(&place, NOISE_OFFSET_Z));
+        const vec epsilon[3] = {noise_cubic(&place, 0), noise_cubic(&place, NOISE_OFFSET_Y), noise_cubic(&place, NOISE_OFFSET_Z)};
+        shift_vertex(in->axes, half, epsilon, x + 3 * j, y + 3 * j);
     }
 }
 
@@ -77,10 +84,10 @@ LANES_INLINE void frizz_far(const struct kernel_inputs *in, const lanes *restric
         vec chi = vec_at_most(frequency * vec_load(at[j]), MANY_TURNS) + shift;
         ivec near = (chi >= 0.0f) & (chi < (float)NOISE_NEAR);
         struct noise_place place = noise_place_of(in->noise, (vec)((ivec)chi & near));
-        for (uint32_t c = 0; c < 3; c++) {
-            vec epsilon = vec_choose(near, noise_cubic(&place, skip[c]), vec_epsilon(chi + offset[c]));
-            vec_store(y[3 * j + c], vec_load(x[3 * j + c]) + half * epsilon);
-        }
+        vec epsilon[3];
+        for (uint32_t c = 0; c < 3; c++)
+            epsilon[c] = vec_choose(near, noise_cubic(&place, skip[c]), vec_epsilon(chi + offset[c]));
+        shift_vertex(in->axes, half, epsilon, x + 3 * j, y + 3 * j);
     }
 }
 
@@ -97,6 +104,16 @@ LANES_INLINE void frizz_forward(const struct kernel_inputs *in, struct bundle x,
         vec_measure(in->m, (const lanes *)y.points, y.at);
 }
 
+/* The adjoint of what noise does along axis `a`; d [3] of a vertex. */
+LANES_INLINE void adjoint_along(const float (*axes)[3], int a, const lanes *restrict d, float *restrict along)
+{
+    if (!axes) {
+        FOR_LANES(l) along[l] = d[a][l];
+        return;
+    }
+    FOR_LANES(l) along[l] = axes[a][0] * d[0][l] + axes[a][1] * d[1][l] + axes[a][2] * d[2][l];
+}
+
 LANES_INLINE void frizz_backward(const struct kernel_inputs *in, const lanes *restrict x, lanes *restrict d,
                                  struct kernel_adjoints *adjoints, lanes *restrict scratch)
 {
@@ -109,14 +126,17 @@ LANES_INLINE void frizz_backward(const struct kernel_inputs *in, const lanes *re
     for (uint32_t j = 0; j < m; j++)
         FOR_LANES(l) d_chi[j][l] = 0.0f;
     for (int c = 0; c < 3; c++)
-        for (uint32_t j = 1; j < m; j++)
+        for (uint32_t j = 1; j < m; j++) {
+            lanes dy;
+            adjoint_along(in->axes, c, d + 3 * j, dy);
             FOR_LANES(l)
             {
                 float chi = place_in_noise(frequency, at[j][l], in->random[0][l]), epsilon;
-                float slope = noise_epsilon_slope(chi + offset[c], &epsilon), dy = d[3 * j + c][l];
-                d_half[l] += dy * epsilon;
-                d_chi[j][l] += half * dy * slope;
+                float slope = noise_epsilon_slope(chi + offset[c], &epsilon);
+                d_half[l] += dy[l] * epsilon;
+                d_chi[j][l] += half * dy[l] * slope;
             }
+        }
     for (uint32_t j = 1; j < m; j++)
         FOR_LANES(l)
         {

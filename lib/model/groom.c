@@ -184,6 +184,12 @@ struct groom groom_with_base(const struct groom *groom, const struct groom_stran
     return view;
 }
 
+const float (*model_axes(const struct groom *groom))[3]
+{
+    static const float space[3][3];
+    return memcmp(groom->axes, space, sizeof space) == 0 ? NULL : (const float (*)[3])groom->axes;
+}
+
 void groom_destroy(struct groom *groom)
 {
     if (!groom)
@@ -247,6 +253,7 @@ groom_status groom_clone(const struct groom *groom, const struct groom_context *
     memcpy(copy->name, groom->name, sizeof copy->name);
     memcpy(copy->base_strands, groom->base_strands, sizeof copy->base_strands);
     copy->scalp = groom->scalp;
+    memcpy(copy->axes, groom->axes, sizeof copy->axes);
     struct array from[N_ARRAYS], to[N_ARRAYS];
     list_arrays((struct groom *)groom, from);
     list_arrays(copy, to);

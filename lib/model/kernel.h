@@ -5,8 +5,8 @@
 #include "groom/groom.h"
 #include "model/lanes.h"
 
-/* Numbers of an operator guide's frame at a vertex: normal x, y (its z is 0), binormal x, y, z. */
-#define FRAME_WIDTH 5
+/* Numbers of an operator guide's frame at a vertex: normal and binormal. */
+#define FRAME_WIDTH 6
 /* ... and of its bend axes: v, and w = e x v, both unit and perpendicular to the root direction e. */
 #define AXIS_WIDTH 6
 
@@ -17,6 +17,7 @@ struct kernel_inputs {
     const lanes *frame; /* [FRAME_WIDTH * m]; where the chain curls */
     const lanes *axis;  /* [AXIS_WIDTH]; where the chain bends */
     const float (*noise)[4]; /* [NOISE_TABLE], where the chain frizzes */
+    const float (*axes)[3];  /* [3] of the groom, along which noise shifts; NULL: those of space */
     float parameter[GROOM_OPERATOR_MAX_PARAMETERS];
     lanes random[GROOM_OPERATOR_MAX_RANDOM];
 };

@@ -17,6 +17,9 @@ GROOM_MUST_CHECK groom_status model_give_base(struct groom *groom, uint32_t n_ba
 /* Where the strand's points are relative to: its root, or where its base begins. */
 const float *model_root(const struct groom *groom, uint32_t strand);
 
+/* The axes that operators lean on, or NULL: those of space. */
+const float (*model_axes(const struct groom *groom))[3];
+
 /* How many random numbers each array of an operator of this type holds in this groom. */
 size_t model_random_count(const struct groom *groom, groom_operator_type type);
 

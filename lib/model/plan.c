@@ -41,9 +41,9 @@ static void frame_piece(void *user, uint32_t piece, uint32_t thread)
     for (uint32_t o = piece * GUIDES_A_PIECE; o < end && o < groom->n_operator_guides; o++) {
         const float(*guide)[3] = (const float(*)[3])groom->guides + (size_t)groom->operator_guide[o] * m;
         if (framing->used[o] && plan->curls)
-            frames_curl(guide, m, plan->frame + (size_t)o * FRAME_WIDTH * m);
+            frames_curl(guide, m, plan->axes, plan->frame + (size_t)o * FRAME_WIDTH * m);
         if (framing->used[o] && plan->bends)
-            frames_bend(guide, plan->axis + (size_t)o * AXIS_WIDTH);
+            frames_bend(guide, plan->axes, plan->axis + (size_t)o * AXIS_WIDTH);
     }
 }
 
@@ -106,7 +106,7 @@ groom_status plan_init(struct plan *plan, const struct groom *groom, const uint3
                        uint32_t count, enum kernel_variant variant, const struct groom_context *context)
 {
     groom_status status = GROOM_OK;
-    *plan = (struct plan){.groom = groom, .variant = variant, .allocator = memory_allocator(context)};
+    *plan = (struct plan){.groom = groom, .axes = model_axes(groom), .variant = variant, .allocator = memory_allocator(context)};
     plan->active = memory_array(plan->allocator, groom->n_operators, sizeof *plan->active);
     if (!plan->active)
         return GROOM_ENOMEM;
@@ -236,7 +236,8 @@ struct kernel_inputs plan_inputs(const struct plan *plan, const struct block *bl
                                  uint32_t a)
 {
     const struct groom_operator *op = &plan->groom->operators[plan->active[a]];
-    struct kernel_inputs in = {.m = w->m, .root = (const lanes *)w->root, .guide = w->guide, .frame = w->frame, .axis = w->axis, .noise = (const float(*)[4])plan->noise};
+    struct kernel_inputs in = {.m = w->m, .root = (const lanes *)w->root, .guide = w->guide, .frame = w->frame, .axis = w->axis,
+                               .noise = (const float(*)[4])plan->noise, .axes = plan->axes};
     memcpy(in.parameter, op->parameter, sizeof in.parameter);
     for (uint32_t r = 0; r < groom_operator_random_arrays(op->type); r++)
         for (uint32_t l = 0; l < LANES; l++) {

@@ -9,6 +9,7 @@
 
 struct plan {
     const struct groom *groom;
+    const float (*axes)[3]; /* [3] of the groom; NULL: those of space */
     enum kernel_variant variant;
     uint32_t n_active;      /* enabled operators */
     uint32_t *active;       /* [n_active] their indices, in the order of the chain */

@@ -202,9 +202,9 @@ static void frames_piece(void *user, uint32_t piece, uint32_t thread)
         float(*row)[3] = (float(*)[3])(s->instance + (size_t)i * 3 * m);
         memset(row, 0, m * sizeof *row);
         if (s->d_frame)
-            frames_curl_backward(guide, m, s->d_frame + (size_t)o * FRAME_WIDTH * m, row);
+            frames_curl_backward(guide, m, s->plan->axes, s->d_frame + (size_t)o * FRAME_WIDTH * m, row);
         if (s->d_axis)
-            frames_bend_backward(guide, s->d_axis + (size_t)o * AXIS_WIDTH, row);
+            frames_bend_backward(guide, s->plan->axes, s->d_axis + (size_t)o * AXIS_WIDTH, row);
     }
 }
 

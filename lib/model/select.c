@@ -44,6 +44,7 @@ static void copy_guides(const struct groom *from, struct groom *to)
     memcpy(to->operator_guide, from->operator_guide, from->n_operator_guides * sizeof *from->operator_guide);
     memcpy(to->name, from->name, sizeof to->name);
     to->scalp = from->scalp;
+    memcpy(to->axes, from->axes, sizeof to->axes);
 }
 
 static groom_status copy_operator(const struct groom *from, uint32_t index, const uint32_t *strand, uint32_t count,

@@ -7,6 +7,7 @@
 #include "model/model.h"
 
 #define WEIGHT_SUM_TOLERANCE 1e-3
+#define AXES_TOLERANCE 1e-3
 #define COORDINATE_LIMIT 1e6f /* metres */
 #define WEIGHT_LIMIT 1e4f
 
@@ -29,6 +30,30 @@ static groom_status check_indices(const uint32_t *indices, size_t n, uint32_t li
             return groom_fail_field(diag, GROOM_EINVAL, pointer, "index %u at %zu is outside 0..%u", indices[i], i,
                                     limit - 1);
     return GROOM_OK;
+}
+
+/* Three unit vectors, each across the others, the third where the right hand has it. */
+static groom_status check_axes(const struct groom *groom, struct groom_diag *diag)
+{
+    const float (*a)[3] = model_axes(groom);
+    double off = 0.0;
+    if (!a)
+        return GROOM_OK;
+    for (int i = 0; i < 3; i++) {
+        int j = (i + 1) % 3, k = (i + 2) % 3;
+        double square = 0.0, across = 0.0;
+        for (int c = 0; c < 3; c++) {
+            square += (double)a[i][c] * a[i][c];
+            across += (double)a[i][c] * a[j][c];
+            double cross = (double)a[i][(c + 1) % 3] * a[j][(c + 2) % 3] - (double)a[i][(c + 2) % 3] * a[j][(c + 1) % 3];
+            off = fmax(off, fabs(cross - (double)a[k][c]));
+        }
+        off = fmax(off, fmax(fabs(square - 1.0), fabs(across)));
+    }
+    if (off <= AXES_TOLERANCE)
+        return GROOM_OK;
+    return groom_fail_field(diag, GROOM_EINVAL, "/axes",
+                            "axes are three unit vectors at right angles to each other, right-handed; these are off by %.3g", off);
 }
 
 static groom_status check_weights(const struct groom *groom, struct groom_diag *diag)
@@ -117,6 +142,8 @@ groom_status groom_validate(const struct groom *g, struct groom_diag *diag)
 #define CHECK(call)                                                                                                  \
     if (status == GROOM_OK)                                                                                          \
     status = call
+    CHECK(check_values(&g->axes[0][0], 9, 2.0f, "/axes", diag));
+    CHECK(check_axes(g, diag));
     if (g->base)
         CHECK(check_values(&g->base[0][0], 3 * (size_t)g->n_base, COORDINATE_LIMIT, "/base/points", diag));
     CHECK(check_values(&g->roots[0][0], 3 * n, COORDINATE_LIMIT, "/strands/roots", diag));

@@ -26,7 +26,7 @@ groom_status documents_load(struct grooms *grooms, const char *groom_id, uint32_
 
 void documents_strip_model(cJSON *document)
 {
-    static const char *const members[] = {"strands", "guides", "instancing", "operator_guides", "operators", "base"};
+    static const char *const members[] = {"strands", "guides", "instancing", "operator_guides", "operators", "base", "axes"};
     for (size_t i = 0; i < sizeof members / sizeof members[0]; i++)
         cJSON_DeleteItemFromObjectCaseSensitive(document, members[i]);
 }

@@ -24,7 +24,7 @@ void evaluate_next_key(const char *key, const char *operator_json, char next[STO
 /* Where strands come from: references to arrays stand for what is in them. */
 static groom_status source_key(const cJSON *document, char key[STORE_HASH_SIZE])
 {
-    static const char *const members[] = {"strands", "guides", "instancing", "operator_guides", "base"};
+    static const char *const members[] = {"strands", "guides", "instancing", "operator_guides", "base", "axes"};
     memset(key, '0', STORE_HASH_SIZE - 1);
     key[STORE_HASH_SIZE - 1] = 0;
     for (size_t i = 0; i < sizeof members / sizeof members[0]; i++) {

@@ -43,6 +43,25 @@ test('page and daemon evaluate every style alike, to the bit', async (t) => {
     });
 });
 
+/* As a fit writes it for hair that lies askew. */
+const slanted = [[0.36, 0.48, -0.8], [-0.8, 0.6, 0], [0.48, 0.64, 0.6]];
+
+test('page and daemon lean on the axes of a groom alike, to the bit', async (t) => {
+  const daemon = await startDaemon(t);
+  const upright = sample(t, 'curly'), document = { ...upright, axes: slanted };
+  const { json } = await expect(daemon, 201, 'POST', '/v1/grooms', { body: document });
+  const groom = Groom.fromDocument(engine, document), other = Groom.fromDocument(engine, upright);
+  assert.deepEqual(data_of(groom), await exported(daemon, json.groom));
+  assert.notDeepEqual(data_of(groom), data_of(other));
+  groom.destroy();
+  const kept = (await expect(daemon, 200, 'GET', `/v1/grooms/${json.groom}?arrays=false`)).json;
+  assert.deepEqual(kept.axes.map((row) => row.map(Math.fround)), slanted.map((row) => row.map(Math.fround)));
+  await expect(daemon, 201, 'PATCH', `/v1/grooms/${json.groom}`,
+    { headers: { 'Content-Type': 'application/json-patch+json', 'If-Match': '"1"' }, body: [{ op: 'remove', path: '/axes' }] });
+  assert.deepEqual(data_of(other), await exported(daemon, json.groom));
+  other.destroy();
+});
+
 test('an edit moves the page and the daemon alike', async (t) => {
   const daemon = await startDaemon(t);
   const document = sample(t, 'curly');

@@ -6,6 +6,9 @@
 
 #include "groom/random.h"
 
+const float test_slanted_axes[3][3] = {{0.36f, 0.48f, -0.8f}, {-0.8f, 0.6f, 0}, {0.48f, 0.64f, 0.6f}};
+const float test_quarter_axes[3][3] = {{0, 1, 0}, {0, 0, 1}, {1, 0, 0}};
+
 enum stream { STREAM_GUIDE_ROOT = 1000, STREAM_GUIDE_SHAPE, STREAM_STRAND_ROOT, STREAM_PARAMETER };
 
 /* Not one of Check's assertions: benchmarks use this file too. */

@@ -12,6 +12,9 @@ struct groom *test_groom(struct groom_shape shape, uint64_t seed);
 /* Append an operator with parameters drawn from sensible ranges. */
 void test_append_operator(struct groom *groom, groom_operator_type type, uint64_t seed);
 
+/* Axes for groom.axes: askew, and the file's by quarter turns. */
+extern const float test_slanted_axes[3][3], test_quarter_axes[3][3];
+
 /* All five, in the order of GROOM_OPERATOR_LIST. */
 void test_append_all_operators(struct groom *groom, uint64_t seed);
 

@@ -201,24 +201,16 @@ static void instance(const struct reference *r, uint32_t strand, vec *x)
         }
 }
 
-void reference_strand(const struct reference *r, uint32_t strand, double (*x)[3])
+static void apply(const struct reference *r, const struct reference_operator *op, uint32_t strand, vec *guide, vec *x)
 {
-    const struct groom *groom = r->groom;
-    uint32_t m = groom->n_vertices, o = groom->operator_guide_of[strand];
-    vec *guide = &r->guides[(size_t)groom->operator_guide[o] * m];
-    instance(r, strand, x);
-    for (uint32_t i = 0; i < groom->n_operators; i++) {
-        const struct reference_operator *op = &r->operators[i];
-        if (!op->enabled)
-            continue;
-        switch (op->type) {
-        case GROOM_OPERATOR_SCALE: apply_scale(op->parameter, op->random[0][strand], m, x); break;
-        case GROOM_OPERATOR_BEND: apply_bend(op->parameter, op->random[0][strand], guide, m, x); break;
-        case GROOM_OPERATOR_CURL: apply_curl(op->parameter, op->random[0][o], op->random[1][o], guide, m, x); break;
-        case GROOM_OPERATOR_CLUMP: apply_clump(op->parameter, guide, m, x); break;
-        case GROOM_OPERATOR_FRIZZ: apply_frizz(op->parameter, op->random[0][strand], m, x); break;
-        default: abort();
-        }
+    uint32_t m = r->groom->n_vertices, o = r->groom->operator_guide_of[strand];
+    switch (op->type) {
+    case GROOM_OPERATOR_SCALE: apply_scale(op->parameter, op->random[0][strand], m, x); break;
+    case GROOM_OPERATOR_BEND: apply_bend(op->parameter, op->random[0][strand], guide, m, x); break;
+    case GROOM_OPERATOR_CURL: apply_curl(op->parameter, op->random[0][o], op->random[1][o], guide, m, x); break;
+    case GROOM_OPERATOR_CLUMP: apply_clump(op->parameter, guide, m, x); break;
+    case GROOM_OPERATOR_FRIZZ: apply_frizz(op->parameter, op->random[0][strand], m, x); break;
+    default: abort();
     }
 }
 
@@ -228,6 +220,40 @@ static void *allocate(size_t n, size_t size)
     if (!memory)
         abort();
     return memory;
+}
+
+/* Into the groom's axes, or back. */
+static void turn(const struct groom *groom, int back, vec *x, uint32_t m)
+{
+    for (uint32_t j = 0; j < m; j++) {
+        vec y = {0, 0, 0};
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k < 3; k++)
+                y[c] += (double)(back ? groom->axes[k][c] : groom->axes[c][k]) * x[j][k];
+        memcpy(x[j], y, sizeof y);
+    }
+}
+
+/* What leans on axes of its own is a groom that was turned, evaluated there, and turned back. */
+void reference_strand(const struct reference *r, uint32_t strand, double (*x)[3])
+{
+    const struct groom *groom = r->groom;
+    uint32_t m = groom->n_vertices, o = groom->operator_guide_of[strand];
+    static const float space[3][3];
+    int turned = memcmp(groom->axes, space, sizeof space) != 0;
+    vec *guide = allocate(m, sizeof *guide);
+    memcpy(guide, &r->guides[(size_t)groom->operator_guide[o] * m], m * sizeof *guide);
+    instance(r, strand, x);
+    if (turned) {
+        turn(groom, 0, guide, m);
+        turn(groom, 0, x, m);
+    }
+    for (uint32_t i = 0; i < groom->n_operators; i++)
+        if (r->operators[i].enabled)
+            apply(r, &r->operators[i], strand, guide, x);
+    if (turned)
+        turn(groom, 1, x, m);
+    free(guide);
 }
 
 static double *widen(const float *values, size_t n)

@@ -73,11 +73,13 @@ START_TEST(document_read_back_is_the_same_groom_bit_for_bit)
     strcpy(groom->name, "Löckchen \"1\"");
     groom->operators[1].parameter[0] = 0.1f + 1e-8f;
     groom->operators[3].enabled = 0;
+    memcpy(groom->axes, test_slanted_axes, sizeof groom->axes);
     ck_ok(groom_document_write(groom, "{\"id\":\"grm_x\",\"fit\":{\"losses\":[1,2]}}", NULL, &json, &n, NULL));
     ck_assert_uint_eq(n, strlen(json));
     back = read_back(json, NULL);
     ck_assert_str_eq(back->name, groom->name);
     ck_assert_int_eq(back->operators[3].enabled, 0);
+    ck_assert_mem_eq(back->axes, groom->axes, sizeof back->axes);
     ck_assert_uint_eq(back->operators[2].id, groom->operators[2].id);
     assert_same(groom, back);
     ck_assert_ptr_nonnull(strstr(json, "\"fit\":{\"losses\":[1,2]}"));
@@ -244,6 +246,23 @@ START_TEST(a_refusal_points_at_the_culprit)
 }
 END_TEST
 
+static cJSON *with_axes(const char *json)
+{
+    cJSON *document = small_document();
+    cJSON_AddItemToObject(document, "axes", cJSON_Parse(json));
+    return document;
+}
+
+START_TEST(axes_that_are_none_are_refused)
+{
+    static const char *const none[] = {"3", "[]", "[1,0,0,0,1,0,0,0,1]", "[[1,0,0],[0,1,0]]", "[[1,0,0],[0,1,0],[0,0]]",
+                                       "[[1,0,0],[0,1,0],[0,0,\"1\"]]", "[[1,0,0],[0,1,0],[0,0,-1]]", "[[1,0,0],[0,2,0],[0,0,1]]",
+                                       "[[1,0,0],[0,1,0],[0,0,1e300]]"};
+    for (size_t i = 0; i < sizeof none / sizeof none[0]; i++)
+        expect_refusal(with_axes(none[i]), GROOM_EINVAL, "/axes");
+}
+END_TEST
+
 static cJSON *with_section_member(const char *section, const char *name, const char *json)
 {
     cJSON *document = small_document(), *object = cJSON_GetObjectItem(document, section);
@@ -318,6 +337,7 @@ START_TEST(selected_strands_evaluate_to_the_same_bits)
     struct groom *groom = small_groom(50, 8, 9, 3), *fewer = NULL;
     uint32_t order[50], seen[50] = {0};
     float whole[50][9][3], some[7][9][3];
+    memcpy(groom->axes, test_slanted_axes, sizeof groom->axes);
     groom_fair_order(50, order);
     for (int i = 0; i < 50; i++)
         ck_assert_uint_eq(seen[order[i]]++, 0);
@@ -337,5 +357,5 @@ END_TEST
 TEST_SUITE("document", base64_encodes_the_examples_of_its_standard, base64_refuses_what_is_not_base64,
            document_read_back_is_the_same_groom_bit_for_bit, arrays_kept_elsewhere_are_found_again,
            an_operator_needs_no_more_than_its_type, random_numbers_left_out_are_the_ones_of_the_seed,
-           a_refusal_points_at_the_culprit, an_array_that_lies_is_refused, what_is_not_a_groom_document_is_refused,
-           every_failed_allocation_is_answered, selected_strands_evaluate_to_the_same_bits)
+           a_refusal_points_at_the_culprit, axes_that_are_none_are_refused, an_array_that_lies_is_refused,
+           what_is_not_a_groom_document_is_refused, every_failed_allocation_is_answered, selected_strands_evaluate_to_the_same_bits)

@@ -94,6 +94,54 @@ START_TEST(chains_of_any_order_and_length_follow_the_formulas)
 }
 END_TEST
 
+/* Askew, and by quarter turns, which are exact. */
+START_TEST(operators_lean_on_the_grooms_axes)
+{
+    for (int which = 0; which < 2; which++)
+        for (int type = 0; type <= GROOM_OPERATOR_COUNT; type++) {
+            struct groom *groom = test_groom(middling, 5);
+            memcpy(groom->axes, which ? test_quarter_axes : test_slanted_axes, sizeof groom->axes);
+            if (type < GROOM_OPERATOR_COUNT)
+                test_append_operator(groom, (groom_operator_type)type, 11);
+            else
+                test_append_all_operators(groom, 11);
+            double worst = worst_error(groom);
+            ck_assert_msg(worst < 1.5e-6, "operator %d is off by %g m", type, worst);
+            groom_destroy(groom);
+        }
+}
+END_TEST
+
+/* Noise beyond the table goes another way. */
+START_TEST(fast_frizz_leans_on_the_grooms_axes)
+{
+    struct groom *groom = test_groom(middling, 5);
+    memcpy(groom->axes, test_slanted_axes, sizeof groom->axes);
+    test_append_operator(groom, GROOM_OPERATOR_FRIZZ, 11);
+    groom->operators[0].parameter[0] = 4800.0f;
+    ck_assert_double_lt(worst_error(groom), 6e-7);
+    groom_destroy(groom);
+}
+END_TEST
+
+/* Those that space has, written out, are none. */
+START_TEST(axes_of_space_change_no_bit)
+{
+    struct groom *groom = test_groom(middling, 5);
+    test_append_all_operators(groom, 11);
+    float(*before)[3] = evaluate(groom);
+    for (int c = 0; c < 3; c++)
+        groom->axes[c][c] = 1;
+    float(*after)[3] = evaluate(groom);
+    for (size_t v = 0; v < (size_t)333 * 50; v++)
+        for (int c = 0; c < 3; c++)
+            ck_assert(before[v][c] == after[v][c]); /* -0 is 0 */
+    free(before);
+    free(after);
+    groom_destroy(groom);
+}
+END_TEST
+
 START_TEST(a_disabled_operator_does_nothing)
 {
     struct groom *groom = test_groom(middling, 5);
@@ -216,7 +264,8 @@ START_TEST(evaluation_survives_every_failed_allocation)
 END_TEST
 
 TEST_SUITE("model_evaluate", each_operator_follows_its_formula, frizz_follows_its_formula_beyond_the_table, instancing_follows_equation_3,
-           chains_of_any_order_and_length_follow_the_formulas, a_disabled_operator_does_nothing,
+           chains_of_any_order_and_length_follow_the_formulas, operators_lean_on_the_grooms_axes, fast_frizz_leans_on_the_grooms_axes, axes_of_space_change_no_bit,
+           a_disabled_operator_does_nothing,
            degenerate_guides_follow_the_formulas_and_stay_finite, extreme_parameters_stay_finite,
            any_range_gives_the_same_bits, any_pool_and_any_instruction_set_give_the_same_bits,
            evaluation_survives_every_failed_allocation)

@@ -62,6 +62,16 @@ START_TEST(whole_chains_in_several_orders)
 }
 END_TEST
 
+START_TEST(chains_that_lean_on_axes_of_their_own)
+{
+    struct groom *groom = test_groom(tiny, 5);
+    memcpy(groom->axes, test_slanted_axes, sizeof groom->axes);
+    test_append_all_operators(groom, 1);
+    expect_close(groom, "slanted axes");
+    groom_destroy(groom);
+}
+END_TEST
+
 START_TEST(disabled_operators_have_no_gradient)
 {
     struct groom *groom = test_groom(tiny, 5);
@@ -293,6 +303,7 @@ START_TEST(the_gradient_survives_every_failed_allocation)
 END_TEST
 
 TEST_SUITE("model_gradient", instancing_alone, each_operator, whole_chains_in_several_orders,
+           chains_that_lean_on_axes_of_their_own,
            disabled_operators_have_no_gradient, a_curl_that_starts_at_the_root,
            a_curl_whose_frequency_is_clamped_does_not_turn_with_it, guides_beyond_one_operator_guide_and_shared_ones,
            k_of_one_and_few_vertices, a_visit_of_some_strands_in_any_order, degenerate_guides_give_finite_gradients,

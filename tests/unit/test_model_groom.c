@@ -103,9 +103,11 @@ START_TEST(clone_is_deep_and_equal)
     test_append_all_operators(groom, 3);
     strcpy(groom->name, "original");
     groom->scalp = GROOM_SCALP_ROOTS;
+    memcpy(groom->axes, test_slanted_axes, sizeof groom->axes);
     ck_ok(groom_clone(groom, NULL, &copy, NULL));
     ck_assert_str_eq(copy->name, "original");
     ck_assert_int_eq(copy->scalp, GROOM_SCALP_ROOTS);
+    ck_assert_mem_eq(copy->axes, test_slanted_axes, sizeof copy->axes);
     ck_assert_mem_eq(copy->guides, groom->guides, (size_t)20 * 12 * sizeof *copy->guides);
     ck_assert_mem_eq(copy->instancing_weight, groom->instancing_weight, (size_t)200 * 3 * sizeof(float));
     ck_assert_uint_eq(copy->n_operators, 5);
@@ -147,6 +149,12 @@ START_TEST(validate_names_the_culprit)
     EXPECT_REFUSED(groom->instancing_weight[0], NAN, "/instancing/weight");
     EXPECT_REFUSED(groom->operator_guide[4], 20, "/operator_guides/guide");
     EXPECT_REFUSED(groom->operator_guide_of[199], 5, "/operator_guides/of_strand");
+    memcpy(groom->axes, test_slanted_axes, sizeof groom->axes);
+    ck_ok(groom_validate(groom, &diag));
+    EXPECT_REFUSED(groom->axes[0][0], 0.37f, "/axes");
+    EXPECT_REFUSED(groom->axes[2][1], NAN, "/axes");
+    for (int c = 0; c < 3; c++)
+        EXPECT_REFUSED(groom->axes[2][c], -groom->axes[2][c], "/axes"); /* the third makes it left-handed */
     EXPECT_REFUSED(groom->operators[1].parameter[1], 1.5f, "/operators/1/start");
     EXPECT_REFUSED(groom->operators[2].parameter[0], NAN, "/operators/2/radius");
     EXPECT_REFUSED(groom->operators[2].random[1][4], -0.1f, "/operators/2/random/u2");

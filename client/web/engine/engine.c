@@ -44,6 +44,9 @@ void *EXPORT(engine_array)(struct groom *groom, uint32_t which)
     return which < sizeof arrays / sizeof arrays[0] ? arrays[which] : NULL;
 }
 
+/* Nine numbers, row by row. */
+float *EXPORT(engine_axes)(struct groom *groom) { return groom->axes[0]; }
+
 groom_status EXPORT(engine_validate)(const struct groom *groom)
 {
     memset(&last, 0, sizeof last);

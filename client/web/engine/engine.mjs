@@ -133,6 +133,8 @@ export class Groom {
             document.operator_guides.guide.shape[0], document.instancing.guide.shape[1]), count, vertices);
         ARRAYS.forEach(([part, name], which) =>
             engine.copyIn(bytesOf(document[part][name]), engine.exports.engine_array(groom.address, which)));
+        if (document.axes)
+            new Float32Array(engine.memory, engine.exports.engine_axes(groom.address), 9).set(document.axes.flat());
         document.operators.forEach((operator, i) => groom.insert(i, operator));
         engine.check(engine.exports.engine_validate(groom.address));
         return groom;

@@ -8,6 +8,8 @@
  *    "operators":[{"type":"curl","id":3,"enabled":true,"seed":1,"radius":0.006,…,
  *                  "random":{"u1":f32[nop],"u2":f32[nop]}},…]}
  *
+ * Where operators lean on other axes than those of space (groom.axes), there is "axes":[[x,y,z],[x,y,z],[x,y,z]].
+ *
  * A groom made of uploaded strands has, in place of guides, instancing and operator_guides, its strands:
  *    "base":{"strands":"str_…","vertices":u32[n],"points":f32[sum of vertices,3]}
  * where "vertices" says how many each strand has; then strands.roots is what the base begins with.

@@ -183,6 +183,9 @@ struct groom {
     uint32_t n_operator_guides; /* n_gop */
     uint32_t n_instancing;      /* k, guides that a strand blends */
     groom_scalp_source scalp;
+    float axes[3][3];           /* rows: unit vectors, right-handed, that operators lean on: noise shifts strands along them,
+                                 * bends and curls begin at directions that are taken off them. So hair that was made
+                                 * upright and then turned has the numbers that it was made with. {0}: those of space */
 
     uint32_t n_base;            /* vertices of the base; 0: strands are instances of guides */
     uint32_t *first;            /* [n + 1] where each strand begins in it; else NULL */
@@ -230,7 +233,7 @@ GROOM_MUST_CHECK groom_status groom_clone(const struct groom *groom, const struc
                                           struct groom **copy, struct groom_diag *diag);
 
 /* Everything a groom must hold to be evaluated: indices in range, weights finite and summing to 1
- * (within 1e-3), parameters in range, random numbers in range, points finite and within 1 000 km.
+ * (within 1e-3), parameters in range, random numbers in range, points finite and within 1 000 km, axes a rotation.
  * returns  GROOM_OK or GROOM_EINVAL with the JSON pointer of the culprit */
 GROOM_MUST_CHECK groom_status groom_validate(const struct groom *groom, struct groom_diag *diag);
 
