@@ -26,14 +26,14 @@ static void set_rows(struct vec x, struct vec y, double rows[3][3])
     }
 }
 
-/* out = a b, or a b^T */
-static void multiply(const double a[3][3], const double b[3][3], int transposed, double out[3][3])
+/* out = a b */
+static void multiply(const double a[3][3], const double b[3][3], double out[3][3])
 {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
             out[i][j] = 0;
             for (int k = 0; k < 3; k++)
-                out[i][j] += a[i][k] * (transposed ? b[j][k] : b[k][j]);
+                out[i][j] += a[i][k] * b[k][j];
         }
 }
 
@@ -52,12 +52,33 @@ void axes_rotation(const double vector[3], double turn[3][3])
     set_rows(row[0], row[1], turn);
 }
 
-void axes_turn(struct groom_fit *fit, const double turn[3][3])
+void axes_turned(const double frame[3][3], const float vector[3], double out[3][3])
 {
-    double frame[3][3];
-    multiply(turn, (const double (*)[3])fit->frame, 0, frame);
-    set_rows(vec_unit((struct vec){frame[0][0], frame[0][1], frame[0][2]}),
-             vec_unit((struct vec){frame[1][0], frame[1][1], frame[1][2]}), fit->frame);
+    double turn[3][3], turned[3][3];
+    if (vector[0] == 0 && vector[1] == 0 && vector[2] == 0) {
+        memcpy(out, frame, sizeof turn);
+        return;
+    }
+    axes_rotation((const double[3]){vector[0], vector[1], vector[2]}, turn);
+    multiply((const double (*)[3])turn, frame, turned);
+    set_rows(vec_unit((struct vec){turned[0][0], turned[0][1], turned[0][2]}),
+             vec_unit((struct vec){turned[1][0], turned[1][1], turned[1][2]}), out);
+}
+
+void axes_store(const double frame[3][3], float axes[3][3])
+{
+    int space = 1;
+    for (int k = 0; k < 9; k++)
+        space &= frame[k / 3][k % 3] == (k / 3 == k % 3);
+    for (int k = 0; k < 9; k++)
+        axes[k / 3][k % 3] = space ? 0 : (float)frame[k / 3][k % 3];
+}
+
+void axes_give(struct groom_fit *fit)
+{
+    memset(fit->groom->axes, 0, sizeof fit->groom->axes);
+    if (fit->axes != AXES_UNKNOWN)
+        axes_store((const double (*)[3])fit->frame, fit->groom->axes);
 }
 
 /* --- what comes into question ------------------------------------------------------------------- */
@@ -84,7 +105,7 @@ static void list_hairs(const double own[3][3], double frame[HAIRS][3][3])
     for (int k = 0; k < HAIRS; k++) {
         double angle = 2 * PI * k / AROUND, up = k < AROUND ? 1 : -1, turn[3][3];
         set_rows((struct vec){cos(angle), 0, -up * sin(angle)}, (struct vec){0, up, 0}, turn);
-        multiply((const double (*)[3])turn, own, 0, frame[k]);
+        multiply((const double (*)[3])turn, own, frame[k]);
     }
 }
 
@@ -93,11 +114,10 @@ static void list_hairs(const double own[3][3], double frame[HAIRS][3][3])
 static groom_status misfit_along(struct matching *matching, const struct groom_fit *fit, const double frame[3][3], double *square,
                                  const struct groom_context *context, struct groom_diag *diag)
 {
-    double turn[3][3], residual[MOMENTS_COUNT];
+    double residual[MOMENTS_COUNT];
     if (progress_cancelled(context))
         return groom_fail(diag, GROOM_ECANCELLED, "cancelled while the hair's axes were looked for");
-    multiply(frame, (const double (*)[3])fit->frame, 1, turn);
-    groom_status st = matching_residual(matching, fit->groom->operators, (const double (*)[3])turn, residual, context, diag);
+    groom_status st = matching_residual(matching, fit->groom->operators, frame, residual, context, diag);
     *square = 0;
     for (int f = 0; st == GROOM_OK && f < MOMENTS_COUNT; f++)
         *square += residual[f] * residual[f];

@@ -67,14 +67,3 @@ void canonical_frame(const struct groom_fit *fit, const unsigned char *outlier, 
         frame[c][2] = axes[c].z;
     }
 }
-
-void canonical_move(const double frame[3][3], const float centre[3], float (*points)[3], size_t n)
-{
-    for (size_t v = 0; v < n; v++) {
-        double d[3];
-        for (int c = 0; c < 3; c++)
-            d[c] = (double)points[v][c] - (double)centre[c];
-        for (int c = 0; c < 3; c++)
-            points[v][c] = (float)(frame[c][0] * d[0] + frame[c][1] * d[1] + frame[c][2] * d[2]);
-    }
-}

@@ -17,7 +17,4 @@
  * strands that are outliers are left out; at least one is none */
 void canonical_frame(const struct groom_fit *fit, const unsigned char *outlier, double frame[3][3]);
 
-/* n points into the frame whose origin is at `centre`. */
-void canonical_move(const double frame[3][3], const float centre[3], float (*points)[3], size_t n);
-
 #endif

@@ -5,6 +5,7 @@
 
 #include "base/memory.h"
 #include "base/checksum.h"
+#include "fit/axes.h"
 #include "fit/state.h"
 
 #define MOST_GUIDES 10000 /* that options can ask for */
@@ -96,6 +97,7 @@ static void make_groom(struct pen *pen, struct groom_fit *fit, const struct groo
     memcpy(fit->groom->roots, fit->roots, fit->n * sizeof *fit->roots);
     memcpy(fit->groom->root_uv, fit->root_uv, fit->n * sizeof *fit->root_uv);
     fit->groom->scalp = fit->report.scalp;
+    axes_give(fit);
 }
 
 static void pen_groom(struct pen *pen, struct groom_fit *fit)

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "fit/canonical.h"
+#include "fit/axes.h"
 #include "fit/dense.h"
 #include "groom/strands.h"
 
@@ -16,9 +16,6 @@
 struct matching {
     const struct groom_allocator *allocator;
     struct groom *groom;              /* of the sub-sample, with random numbers of its own */
-    float (*guides)[3], (*roots)[3];  /* its own, in the fit's frame */
-    double turn[3][3];                /* of the axes that it lies along, from there */
-    int is_turned;
     struct groom_strands *evaluated;  /* its strands, as they come */
     float (*points)[3];               /* the same resampled as the target was */
     float (*base)[3], (*guide)[3];
@@ -184,49 +181,15 @@ static groom_status allocate(struct matching *matching, const struct groom_conte
     return GROOM_OK;
 }
 
-/* The statistics know no axes, the model does; and floats are finest near the middle of the hair. */
-static groom_status move_groom(struct matching *matching, const struct groom_fit *fit, struct groom_diag *diag)
+/* Floats are finest near the middle of the hair. */
+static void centre_groom(struct groom *groom, const float centre[3])
 {
-    struct groom *groom = matching->groom;
-    size_t n_points = guide_points(groom);
-    canonical_move(fit->frame, fit->centre, groom->guides, n_points);
-    canonical_move(fit->frame, fit->centre, groom->roots, groom->n_strands);
-    matching->guides = memory_array(matching->allocator, n_points, sizeof *matching->guides);
-    matching->roots = memory_array(matching->allocator, groom->n_strands, sizeof *matching->roots);
-    if (!matching->guides || !matching->roots)
-        return groom_fail(diag, GROOM_ENOMEM, "no memory for a sample of %u strands", groom->n_strands);
-    memcpy(matching->guides, groom->guides, n_points * sizeof *matching->guides);
-    memcpy(matching->roots, groom->roots, groom->n_strands * sizeof *matching->roots);
-    return GROOM_OK;
-}
-
-/* NULL: back to the fit's frame. */
-static void turn_groom(struct matching *matching, const double turn[3][3])
-{
-    static const float origin[3] = {0, 0, 0};
-    struct groom *groom = matching->groom;
-    size_t n_points = guide_points(groom);
-    if (turn || matching->is_turned) {
-        memcpy(groom->guides, matching->guides, n_points * sizeof *groom->guides);
-        memcpy(groom->roots, matching->roots, groom->n_strands * sizeof *groom->roots);
-    }
-    matching->is_turned = turn != NULL;
-    if (!turn)
-        return;
-    memcpy(matching->turn, turn, sizeof matching->turn);
-    canonical_move(turn, origin, groom->guides, n_points);
-    canonical_move(turn, origin, groom->roots, groom->n_strands);
-}
-
-/* Strands that were evaluated along turned axes. */
-static void turn_back(struct matching *matching)
-{
-    double back[3][3];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            back[i][j] = matching->turn[j][i];
-    if (matching->is_turned)
-        canonical_move((const double (*)[3])back, (const float[3]){0, 0, 0}, matching->points, points_of(matching));
+    for (size_t v = 0; v < guide_points(groom); v++)
+        for (int c = 0; c < 3; c++)
+            groom->guides[v][c] -= centre[c];
+    for (uint32_t i = 0; i < groom->n_strands; i++)
+        for (int c = 0; c < 3; c++)
+            groom->roots[i][c] -= centre[c];
 }
 
 static groom_status make_base(struct matching *matching, const struct groom_context *context, struct groom_diag *diag)
@@ -259,7 +222,6 @@ static void take_target(struct matching *matching, const struct groom_fit *fit, 
         for (uint32_t j = 0; j < m; j++)
             for (int c = 0; c < 3; c++)
                 matching->points[(size_t)i * m + j][c] = fit->target[(size_t)strand[i] * m + j][c] * fit->scale;
-    canonical_move(fit->frame, (const float[3]){0, 0, 0}, matching->points, points_of(matching));
 }
 
 static void measure_target(struct matching *matching, const struct groom_context *context)
@@ -281,7 +243,6 @@ static groom_status simulate(struct matching *matching, const struct groom_conte
     if (st == GROOM_OK)
         st = groom_strands_resample(matching->evaluated, matching->plan.m, matching->points, context, diag);
     if (st == GROOM_OK) {
-        turn_back(matching);
         moments_measure(&matching->plan, (const float (*)[3])matching->points, matching->values, context);
     }
     return st;
@@ -331,8 +292,9 @@ groom_status matching_create(const struct groom_fit *fit, const struct matching_
     if ((st = choose_pairs(fit, n, strand, context, diag)) != GROOM_OK ||
         (st = groom_select(fit->groom, strand, 2 * n, context, &matching->groom, diag)) != GROOM_OK)
         goto out;
-    if ((st = move_groom(matching, fit, diag)) != GROOM_OK ||
-        (st = draw_numbers(matching->groom, wanted->known, allocator, diag)) != GROOM_OK ||
+    centre_groom(matching->groom, fit->centre);
+    axes_store((const double (*)[3])fit->frame, matching->groom->axes);
+    if ((st = draw_numbers(matching->groom, wanted->known, allocator, diag)) != GROOM_OK ||
         (st = allocate(matching, context, diag)) != GROOM_OK ||
         (st = make_base(matching, context, diag)) != GROOM_OK)
         goto out;
@@ -359,22 +321,18 @@ void matching_destroy(struct matching *matching)
     memory_release(allocator, matching->guide, n_points, sizeof *matching->guide);
     memory_release(allocator, matching->values, matching->plan.n_pairs, MOMENTS_COUNT * sizeof *matching->values);
     memory_release(allocator, matching->cholesky, MOMENTS_COUNT, MOMENTS_COUNT * sizeof *matching->cholesky);
-    if (matching->groom) {
-        memory_release(allocator, matching->guides, guide_points(matching->groom), sizeof *matching->guides);
-        memory_release(allocator, matching->roots, matching->groom->n_strands, sizeof *matching->roots);
-    }
     groom_strands_destroy(matching->evaluated);
     groom_destroy(matching->groom);
     memory_release(allocator, matching, 1, sizeof *matching);
 }
 
-groom_status matching_residual(struct matching *matching, const struct groom_operator *operators, const double turn[3][3],
+groom_status matching_residual(struct matching *matching, const struct groom_operator *operators, const double axes[3][3],
                                double residual[MOMENTS_COUNT], const struct groom_context *context, struct groom_diag *diag)
 {
     struct groom *groom = matching->groom;
     for (uint32_t o = 0; o < groom->n_operators; o++)
         memcpy(groom->operators[o].parameter, operators[o].parameter, sizeof operators[o].parameter);
-    turn_groom(matching, turn);
+    axes_store(axes, groom->axes);
     groom_status st = simulate(matching, context, diag);
     if (st != GROOM_OK)
         return st;

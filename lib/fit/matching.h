@@ -28,12 +28,12 @@ void matching_destroy(struct matching *matching); /* takes NULL */
 /* How far the statistics of the groom with these operators are from the target's, as independent numbers
  * of variance 1 where the operators are right (with guides that are right, too).
  * operators  of the fit's groom, of which the parameters are read
- * turn       of the axes that they lie along, against the fit's frame: rows are the new ones in it; NULL: none
+ * axes       rows: those that operators lean on
  * residual   [MOMENTS_COUNT] out
  * returns    GROOM_OK, GROOM_ENOMEM
  * threads    same bits for any pool */
 GROOM_MUST_CHECK groom_status matching_residual(struct matching *matching, const struct groom_operator *operators,
-                                                const double turn[3][3], double residual[MOMENTS_COUNT],
+                                                const double axes[3][3], double residual[MOMENTS_COUNT],
                                                 const struct groom_context *context, struct groom_diag *diag);
 
 #endif

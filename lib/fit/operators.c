@@ -140,13 +140,15 @@ static void write_unknown(const struct unknown *unknown, double x)
 /* The fit's operators with parameters of their own, to be tried. */
 struct trial {
     struct groom_operator operators[GROOM_FIT_MAX_OPERATORS];
-    float turn[3];  /* of the axes that they lie along, against the fit's frame: a rotation vector */
+    double frame[3][3]; /* the fit's, */
+    float turn[3];      /* and how far from it the axes are that they lean on: a rotation vector */
     struct unknown unknowns[MOST_PARAMETERS];
     uint32_t n_operators, n_unknowns;
 };
 
 static void trial_init_known(const struct groom_fit *fit, int frequencies_known, struct trial *trial)
 {
+    memcpy(trial->frame, fit->frame, sizeof trial->frame);
     memset(trial->turn, 0, sizeof trial->turn);
     trial->n_operators = fit->groom->n_operators;
     if (trial->n_operators) /* of none there is no array to copy */
@@ -162,22 +164,11 @@ static void trial_init(const struct groom_fit *fit, struct trial *trial)
         trial->unknowns[trial->n_unknowns++] = (struct unknown){&trial->turn[k], -FARTHEST_TURN, FARTHEST_TURN, 0, 0, 0, 0};
 }
 
-static int is_turned(const struct trial *trial) { return trial->turn[0] != 0 || trial->turn[1] != 0 || trial->turn[2] != 0; }
-
-static void turn_of(const struct trial *trial, double turn[3][3])
-{
-    axes_rotation((const double[3]){trial->turn[0], trial->turn[1], trial->turn[2]}, turn);
-}
-
 static void trial_keep(const struct trial *trial, struct groom_fit *fit)
 {
     for (uint32_t o = 0; o < trial->n_operators; o++)
         memcpy(fit->groom->operators[o].parameter, trial->operators[o].parameter, sizeof trial->operators[o].parameter);
-    if (is_turned(trial)) {
-        double turn[3][3];
-        turn_of(trial, turn);
-        axes_turn(fit, (const double (*)[3])turn);
-    }
+    axes_turned((const double (*)[3])trial->frame, trial->turn, fit->frame);
 }
 
 static uint32_t count_unknowns(const struct groom_fit *fit)
@@ -200,9 +191,9 @@ static double square_of(const double residual[MOMENTS_COUNT])
 static groom_status residual_of(struct matching *matching, const struct trial *trial, double residual[MOMENTS_COUNT],
                                 const struct groom_context *context, struct groom_diag *diag)
 {
-    double turn[3][3];
-    turn_of(trial, turn);
-    return matching_residual(matching, trial->operators, is_turned(trial) ? (const double (*)[3])turn : NULL, residual, context, diag);
+    double axes[3][3];
+    axes_turned((const double (*)[3])trial->frame, trial->turn, axes);
+    return matching_residual(matching, trial->operators, (const double (*)[3])axes, residual, context, diag);
 }
 
 static groom_status misfit(struct matching *matching, const struct trial *trial, double *square,
@@ -386,8 +377,8 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequ
     trial_init_known(fit, frequencies_known, &here);
     if (here.n_unknowns == 0 || fit->n < FEWEST_STRANDS)
         return GROOM_OK;
-    /* along other axes, the curls that were found are not the target's */
-    struct matching_wanted wanted = {fit->options.stages.operators.pairs, FLOOR_LAST, fit->axes == AXES_GIVEN, 1};
+    /* where axes are not known, curls were found along others than those that are matched along */
+    struct matching_wanted wanted = {fit->options.stages.operators.pairs, FLOOR_LAST, fit->axes != AXES_UNKNOWN, 1};
     groom_status st = matching_create(fit, &wanted, context, &matching, diag);
     if (st != GROOM_OK)
         return st;
@@ -609,16 +600,14 @@ static groom_status try_step(struct groom_fit *fit, const struct groom_context *
 static groom_status match_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     struct trial before;
-    double frame[3][3];
     uint32_t axes = fit->axes;
     trial_init_known(fit, 0, &before);
-    memcpy(frame, fit->frame, sizeof frame);
     groom_status st = try_step(fit, context, diag);
     if (st != GROOM_OK) {
         trial_keep(&before, fit);
-        memcpy(fit->frame, frame, sizeof frame);
         fit->axes = axes;
     }
+    axes_give(fit);
     return st;
 }
 

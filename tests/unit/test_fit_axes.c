@@ -6,6 +6,7 @@
 #include "fit/axes.h"
 #include "fit/matching.h"
 #include "groom/context.h"
+#include "tests/support/fits.h"
 #include "tests/support/guides.h"
 #include "tests/support/invariance.h"
 #include "tests/support/known.h"
@@ -157,21 +158,22 @@ START_TEST(a_choice_that_fails_changes_nothing)
 }
 END_TEST
 
-/* --- turned operators -------------------------------------------------------------------------------- */
+/* --- operators -------------------------------------------------------------------------------- */
 
-/* A turn is undone by none, and what is turned all the way round is where it was. */
-START_TEST(operators_are_matched_along_turned_axes)
+/* A vector of any length turns a frame by that, and what is turned all the way round is where it was. */
+START_TEST(operators_are_matched_along_the_axes_that_are_asked_for)
 {
     struct groom_sample *sample;
     struct groom_fit *fit = fit_of(GROOM_SAMPLE_WAVY, invariance_as_it_is, "operators", &sample);
     struct matching_wanted wanted = {.n_pairs = PAIRS, .floor = 0.03};
     struct matching *matching;
     double before[MOMENTS_COUNT], turned[MOMENTS_COUNT], after[MOMENTS_COUNT], round[3][3];
-    axes_rotation((const double[3]){0, 2 * acos(-1), 0}, round);
+    axes_turned(invariance_as_it_is, (const float[3]){0, (float)(2 * acos(-1)), 0}, round);
+    is_rotation((const double (*)[3])round);
     ck_ok(matching_create(fit, &wanted, NULL, &matching, NULL));
-    ck_ok(matching_residual(matching, fit->groom->operators, NULL, before, NULL, NULL));
+    ck_ok(matching_residual(matching, fit->groom->operators, invariance_as_it_is, before, NULL, NULL));
     ck_ok(matching_residual(matching, fit->groom->operators, invariance_upright, turned, NULL, NULL));
-    ck_ok(matching_residual(matching, fit->groom->operators, NULL, after, NULL, NULL));
+    ck_ok(matching_residual(matching, fit->groom->operators, invariance_as_it_is, after, NULL, NULL));
     ck_assert_mem_eq(before, after, sizeof before);
     double apart = 0;
     for (int f = 0; f < MOMENTS_COUNT; f++)
@@ -186,7 +188,36 @@ START_TEST(operators_are_matched_along_turned_axes)
 }
 END_TEST
 
+/* --- what the groom leans on ---------------------------------------------------------------------------- */
+
+static void leans_on(const struct groom_fit *fit, const double frame[3][3])
+{
+    for (int k = 0; k < 9; k++)
+        ck_assert_double_eq_tol((double)fit->groom->axes[k / 3][k % 3], frame[k / 3][k % 3], 1e-6);
+}
+
+/* Upright hair has a frame of zeroes, by which no bit changes. */
+START_TEST(a_groom_leans_on_the_axes_that_were_found)
+{
+    static const double space[3][3];
+    struct groom_sample *sample, *other;
+    struct groom_fit *given = fit_of(GROOM_SAMPLE_BENT, invariance_as_it_is, "operators", &sample);
+    leans_on(given, space);
+    guides_fit_on(given, "randoms", NULL);
+    leans_on(given, space);
+    struct groom_fit *slanted = fit_of(GROOM_SAMPLE_BENT, invariance_slanted, "randoms", &other);
+    leans_on(slanted, (const double (*)[3])slanted->frame);
+    struct groom_fit_options options = known_options(other, 0);
+    slanted = fits_pass_on(slanted, guides_fit(other, &options, "initialize", NULL));
+    leans_on(slanted, (const double (*)[3])slanted->frame);
+    groom_fit_destroy(slanted);
+    groom_fit_destroy(given);
+    groom_sample_destroy(other);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
 TEST_SUITE("fit_axes", a_quarter_turn_about_z, a_rotation_leaves_its_axis_and_turns_by_its_length,
            axes_of_straight_hair_are_found_as_it_lies, axes_of_bent_hair_are_found_as_it_lies,
            waves_are_found_which_axis_was_up, axes_of_hair_that_lies_askew_are_looked_for, a_choice_that_fails_changes_nothing,
-           operators_are_matched_along_turned_axes)
+           operators_are_matched_along_the_axes_that_are_asked_for, a_groom_leans_on_the_axes_that_were_found)
