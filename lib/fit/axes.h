@@ -19,14 +19,6 @@
 GROOM_MUST_CHECK groom_status axes_choose(struct groom_fit *fit, uint32_t n_pairs, const struct groom_context *context,
                                           struct groom_diag *diag);
 
-/* About `vector` by its length in radians. */
-void axes_rotation(const double vector[3], double turn[3][3]);
-
-/* A frame turned by such a vector; by none it stays, to the bit. */
-void axes_turned(const double frame[3][3], const float vector[3], double out[3][3]);
-
-/* A frame as a groom holds it: {0} where it is that of space. */
-void axes_store(const double frame[3][3], float axes[3][3]);
 /* Has the fit's groom lean on the axes that were found. */
 void axes_give(struct groom_fit *fit);
 

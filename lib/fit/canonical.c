@@ -1,6 +1,6 @@
 #include "fit/canonical.h"
 
-#include "geometry/vec.h"
+#include "fit/frame.h"
 
 #define UNDEFINED 1e-3 /* of what the length of a moment could be */
 
@@ -60,10 +60,5 @@ static struct vec find_front(const struct groom_fit *fit, const unsigned char *o
 void canonical_frame(const struct groom_fit *fit, const unsigned char *outlier, double frame[3][3])
 {
     struct vec y = find_up(fit, outlier), z = find_front(fit, outlier, y), x = vec_cross(y, z);
-    const struct vec axes[3] = {x, y, z};
-    for (int c = 0; c < 3; c++) {
-        frame[c][0] = axes[c].x;
-        frame[c][1] = axes[c].y;
-        frame[c][2] = axes[c].z;
-    }
+    frame_of(x, y, frame);
 }

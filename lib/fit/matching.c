@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "fit/axes.h"
 #include "fit/dense.h"
+#include "fit/frame.h"
 #include "groom/strands.h"
 
 #define NEIGHBOURS 8          /* of which a partner is chosen */
@@ -293,7 +293,7 @@ groom_status matching_create(const struct groom_fit *fit, const struct matching_
         (st = groom_select(fit->groom, strand, 2 * n, context, &matching->groom, diag)) != GROOM_OK)
         goto out;
     centre_groom(matching->groom, fit->centre);
-    axes_store((const double (*)[3])fit->frame, matching->groom->axes);
+    frame_store((const double (*)[3])fit->frame, matching->groom->axes);
     if ((st = draw_numbers(matching->groom, wanted->known, allocator, diag)) != GROOM_OK ||
         (st = allocate(matching, context, diag)) != GROOM_OK ||
         (st = make_base(matching, context, diag)) != GROOM_OK)
@@ -332,7 +332,7 @@ groom_status matching_residual(struct matching *matching, const struct groom_ope
     struct groom *groom = matching->groom;
     for (uint32_t o = 0; o < groom->n_operators; o++)
         memcpy(groom->operators[o].parameter, operators[o].parameter, sizeof operators[o].parameter);
-    axes_store(axes, groom->axes);
+    frame_store(axes, groom->axes);
     groom_status st = simulate(matching, context, diag);
     if (st != GROOM_OK)
         return st;

@@ -16,13 +16,12 @@
 #include "base/memory.h"
 #include "base/progress.h"
 #include "fit/axes.h"
-#include "fit/dense.h"
 #include "fit/gather.h"
 #include "fit/gradient_determinant.h"
 #include "fit/loss_determinant.h"
-#include "fit/matching.h"
 #include "fit/operators.h"
 #include "fit/paper_operators.h"
+#include "fit/trial.h"
 #include "groom/strands.h"
 #include "quality/loss_wasserstein.h"
 
@@ -34,7 +33,6 @@ enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 #define UNIT 0.1               /* metres on an ordinary head: what the paper's weights were made for */
 #define LOSS_STRANDS 1500      /* compared by the shape losses */
 #define FEWEST_STRANDS 32      /* that statistics are taken of: the estimates of fewer stay */
-#define LEAST_LOGARITHM 1e-3   /* of a parameter's initial value: as good as 0 */
 #define LEAST_START 0.3        /* of a parameter's initial value, to begin with: below, it hardly shows */
 #define LEAST_RANDOM 1.0       /* of one that scales a random number: the effect goes with its square */
 #define FLOOR_FIRST 0.3        /* of the statistics in the first step, and how it falls to the last */
@@ -43,169 +41,25 @@ enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 #define SEARCH_SHARE 3         /* one pair in so many */
 #define AXES_FLOOR 0.011       /* of the statistics in the step before which the hair's axes are chosen */
 #define LAST_LOOK 4            /* steps before the last, in which they are chosen again */
-#define FARTHEST_TURN 0.5      /* of these in one step, radians */
-#define PROBE 0.03             /* step of a finite difference of a frequency's logarithm or a fraction of a strand */
-#define PROBE_SIZE 0.1         /* of the logarithm of a size: wide, so that rounding of strands does not show in a slope */
-#define LONGEST_STEP 0.7       /* of a parameter in one step of refinement */
-#define LONGEST_START 0.2      /* the same of where a bend or curl sets in */
-#define DAMPING_FLOOR 0.1      /* keeps parameters that nothing speaks for where they are */
-#define LEAST_TURNS 1.0        /* of a curl over a guide: less is a shift that all strands of an operator guide
-                                * share, which shows as patches, most of all in short hair */
 #define CONVERGED 1e-3       /* share of the misfit that a step must gain, while guides are rough; */
 #define CONVERGED_LAST 1e-5  /* when they are known: valleys are flat, and what stops on their sides remembers its way */
 #define STEPS_AT_HAND 4      /* by the same slopes, near the minimum */
-#define MOST_PARAMETERS (GROOM_FIT_MAX_OPERATORS * GROOM_OPERATOR_MAX_PARAMETERS + 3)
 
 /* --- parameters --------------------------------------------------------------------------- */
 
-/* A number that is fitted: sizes as logarithms, places along the strand as they are. */
-struct unknown {
-    float *value;
-    double minimum, maximum, initial;
-    int logarithmic;
-    int frequency, random;
-};
-
-/* What a parameter's initial value in metres is on a head of this size. */
-static double initial_of(const struct groom_operator_parameter *parameter, double ordinary)
+/* With the axes where these are not the file's, or near them. */
+static void begin_trial(const struct groom_fit *fit, struct trial *trial)
 {
-    if (strcmp(parameter->unit, "m") == 0)
-        return parameter->initial * ordinary;
-    return strcmp(parameter->unit, "1/m") == 0 ? parameter->initial / ordinary : parameter->initial;
-}
-
-static double mean_guide_length(const struct groom *groom)
-{
-    double sum = 0;
-    for (uint32_t g = 0; g < groom->n_guides; g++)
-        sum += groom_polyline_length((const float (*)[3])groom->guides + (size_t)g * groom->n_vertices, groom->n_vertices);
-    return sum / groom->n_guides;
-}
-
-static double minimum_of(const struct groom_operator_parameter *parameter, double initial, groom_operator_type type,
-                         double guide_length)
-{
-    double least = fmax(parameter->minimum, LEAST_LOGARITHM * initial);
-    if (type == GROOM_OPERATOR_CURL && strcmp(parameter->name, "frequency") == 0 && guide_length > 0)
-        least = fmin(fmax(least, LEAST_TURNS / guide_length), parameter->maximum);
-    return least;
-}
-
-/* Stage initialize looked for a curl or a clump and found none: the statistics could still be met a little
- * better with one, at the price of patches, for these two move the strands of an operator guide together. */
-static int is_absent(const struct groom_operator *op)
-{
-    return (op->type == GROOM_OPERATOR_CURL || op->type == GROOM_OPERATOR_CLUMP) && op->parameter[0] == 0;
-}
-
-static int is_known(const struct groom_operator *op, const char *name, int frequencies_known)
-{
-    return frequencies_known && op->type == GROOM_OPERATOR_CURL &&
-           (strcmp(name, "frequency") == 0 || strcmp(name, "random_frequency") == 0);
-}
-
-static uint32_t list_unknowns(struct groom_operator *operators, uint32_t n_operators, int frequencies_known,
-                              double ordinary, double guide_length, struct unknown *unknowns)
-{
-    uint32_t n = 0, n_parameters;
-    for (uint32_t o = 0; o < n_operators; o++) {
-        const struct groom_operator_parameter *p = groom_operator_parameters(operators[o].type, &n_parameters);
-        for (uint32_t k = 0; operators[o].enabled && !is_absent(&operators[o]) && k < n_parameters; k++) {
-            int place = p[k].slider_maximum <= 1 && strcmp(p[k].name, "start") == 0;
-            double initial = initial_of(&p[k], ordinary);
-            if (is_known(&operators[o], p[k].name, frequencies_known))
-                continue;
-            unknowns[n++] = (struct unknown){&operators[o].parameter[k],
-                                             place ? p[k].minimum
-                                                   : minimum_of(&p[k], initial, operators[o].type, guide_length),
-                                             p[k].maximum, initial, !place,
-                                             strcmp(p[k].name, "frequency") == 0,
-                                             strncmp(p[k].name, "random", 6) == 0};
-        }
-    }
-    return n;
-}
-
-static double read_unknown(const struct unknown *unknown)
-{
-    return unknown->logarithmic ? log(fmax(*unknown->value, unknown->minimum)) : *unknown->value;
-}
-
-static void write_unknown(const struct unknown *unknown, double x)
-{
-    double value = unknown->logarithmic ? exp(x) : x;
-    *unknown->value = (float)fmin(fmax(value, unknown->minimum), unknown->maximum);
-}
-
-/* The fit's operators with parameters of their own, to be tried. */
-struct trial {
-    struct groom_operator operators[GROOM_FIT_MAX_OPERATORS];
-    double frame[3][3]; /* the fit's, */
-    float turn[3];      /* and how far from it the axes are that they lean on: a rotation vector */
-    struct unknown unknowns[MOST_PARAMETERS];
-    uint32_t n_operators, n_unknowns;
-};
-
-static void trial_init_known(const struct groom_fit *fit, int frequencies_known, struct trial *trial)
-{
-    memcpy(trial->frame, fit->frame, sizeof trial->frame);
-    memset(trial->turn, 0, sizeof trial->turn);
-    trial->n_operators = fit->groom->n_operators;
-    if (trial->n_operators) /* of none there is no array to copy */
-        memcpy(trial->operators, fit->groom->operators, trial->n_operators * sizeof *trial->operators);
-    trial->n_unknowns = list_unknowns(trial->operators, trial->n_operators, frequencies_known, fit->ordinary,
-                                      mean_guide_length(fit->groom), trial->unknowns);
-}
-
-static void trial_init(const struct groom_fit *fit, struct trial *trial)
-{
-    trial_init_known(fit, 0, trial);
-    for (int k = 0; fit->axes == AXES_NEAR && k < 3; k++)
-        trial->unknowns[trial->n_unknowns++] = (struct unknown){&trial->turn[k], -FARTHEST_TURN, FARTHEST_TURN, 0, 0, 0, 0};
-}
-
-static void trial_keep(const struct trial *trial, struct groom_fit *fit)
-{
-    for (uint32_t o = 0; o < trial->n_operators; o++)
-        memcpy(fit->groom->operators[o].parameter, trial->operators[o].parameter, sizeof trial->operators[o].parameter);
-    axes_turned((const double (*)[3])trial->frame, trial->turn, fit->frame);
+    trial_init(fit, 0, trial);
+    if (fit->axes == AXES_NEAR)
+        trial_let_turn(trial);
 }
 
 static uint32_t count_unknowns(const struct groom_fit *fit)
 {
     struct trial trial;
-    trial_init(fit, &trial);
+    begin_trial(fit, &trial);
     return trial.n_unknowns;
-}
-
-/* --- the misfit ------------------------------------------------------------------------------ */
-
-static double square_of(const double residual[MOMENTS_COUNT])
-{
-    double sum = 0;
-    for (int f = 0; f < MOMENTS_COUNT; f++)
-        sum += residual[f] * residual[f];
-    return sum;
-}
-
-static groom_status residual_of(struct matching *matching, const struct trial *trial, double residual[MOMENTS_COUNT],
-                                const struct groom_context *context, struct groom_diag *diag)
-{
-    double axes[3][3];
-    axes_turned((const double (*)[3])trial->frame, trial->turn, axes);
-    return matching_residual(matching, trial->operators, (const double (*)[3])axes, residual, context, diag);
-}
-
-static groom_status misfit(struct matching *matching, const struct trial *trial, double *square,
-                           const struct groom_context *context, struct groom_diag *diag)
-{
-    double residual[MOMENTS_COUNT] = {0};
-    *square = INFINITY;
-    if (progress_cancelled(context))
-        return groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage operators");
-    groom_status st = residual_of(matching, trial, residual, context, diag);
-    *square = square_of(residual);
-    return st;
 }
 
 /* --- search ------------------------------------------------------------------------------------ */
@@ -216,11 +70,11 @@ static groom_status search_one(struct matching *matching, struct trial *trial, u
 {
     static const double ratios[] = {-1.0, -0.5, 0.5, 1.0}, shifts[] = {-0.3, -0.15, 0.15, 0.3};
     const struct unknown *unknown = &trial->unknowns[index];
-    double start = read_unknown(unknown), best = start;
+    double start = trial_read(unknown), best = start;
     for (int k = 0; k < 4; k++) {
         double other, x = start + (unknown->logarithmic ? ratios[k] : shifts[k]);
-        write_unknown(unknown, x);
-        groom_status st = misfit(matching, trial, &other, context, diag);
+        trial_write(unknown, x);
+        groom_status st = trial_misfit(matching, trial, &other, context, diag);
         if (st != GROOM_OK)
             return st;
         if (other < *square) {
@@ -228,144 +82,11 @@ static groom_status search_one(struct matching *matching, struct trial *trial, u
             best = x;
         }
     }
-    write_unknown(unknown, best);
+    trial_write(unknown, best);
     return GROOM_OK;
 }
 
-/* --- refinement ---------------------------------------------------------------------------------- */
-
-/* The residual with an unknown moved as far as its range lets it; returns by how much. */
-static groom_status probe(struct matching *matching, struct trial *trial, uint32_t index, double move, double *moved,
-                          double residual[MOMENTS_COUNT], const struct groom_context *context, struct groom_diag *diag)
-{
-    const struct unknown *unknown = &trial->unknowns[index];
-    double x = read_unknown(unknown);
-    float kept = *unknown->value;
-    if (progress_cancelled(context))
-        return groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage operators");
-    write_unknown(unknown, x + move);
-    *moved = read_unknown(unknown) - x;
-    groom_status st = *moved != 0 ? residual_of(matching, trial, residual, context, diag) : GROOM_OK;
-    *unknown->value = kept;
-    return st;
-}
-
-/* The misfit's slope for each unknown. One side alone leans to where the misfit bends: steps by it end short of the
- * minimum, where that is depends on the way, and rounding decides. Far from it, one is enough.
- * jacobian [n_unknowns][MOMENTS_COUNT] */
-static groom_status differentiate(struct matching *matching, struct trial *trial, const double residual[MOMENTS_COUNT],
-                                  int both_sides, double *jacobian, const struct groom_context *context,
-                                  struct groom_diag *diag)
-{
-    for (uint32_t k = 0; k < trial->n_unknowns; k++) {
-        const struct unknown *unknown = &trial->unknowns[k];
-        double *column = jacobian + (size_t)k * MOMENTS_COUNT, below[MOMENTS_COUNT], up, down = 0;
-        double move = unknown->logarithmic && !unknown->frequency ? PROBE_SIZE : PROBE;
-        memcpy(column, residual, sizeof below); /* what there is on a side where its range ends here */
-        memcpy(below, residual, sizeof below);
-        groom_status st = probe(matching, trial, k, move, &up, column, context, diag);
-        if (st == GROOM_OK && (both_sides || !(up > 0)))
-            st = probe(matching, trial, k, -move, &down, below, context, diag);
-        if (st != GROOM_OK)
-            return st;
-        for (int f = 0; f < MOMENTS_COUNT; f++)
-            column[f] = up > down ? (column[f] - below[f]) / (up - down) : 0;
-    }
-    return GROOM_OK;
-}
-
-static double dot(const double *a, const double *b)
-{
-    double sum = 0;
-    for (int f = 0; f < MOMENTS_COUNT; f++)
-        sum += a[f] * b[f];
-    return sum;
-}
-
-/* (J^T J + damping) step = -J^T r */
-static int solve_step(const double *jacobian, const double residual[MOMENTS_COUNT], uint32_t n, double damping,
-                      double step[MOST_PARAMETERS])
-{
-    double a[MOST_PARAMETERS * MOST_PARAMETERS];
-    for (uint32_t i = 0; i < n; i++) {
-        const double *row = jacobian + (size_t)i * MOMENTS_COUNT;
-        for (uint32_t j = 0; j <= i; j++)
-            a[i * n + j] = dot(row, jacobian + (size_t)j * MOMENTS_COUNT);
-        a[i * n + i] += damping * a[i * n + i] + DAMPING_FLOOR;
-        step[i] = -dot(row, residual);
-    }
-    if (!dense_cholesky(a, n))
-        return 0;
-    dense_forward(a, n, step);
-    dense_backward(a, n, step);
-    return 1;
-}
-
-static void take_step(struct trial *trial, const double start[MOST_PARAMETERS], const double step[MOST_PARAMETERS])
-{
-    for (uint32_t k = 0; k < trial->n_unknowns; k++) {
-        double most = trial->unknowns[k].logarithmic ? LONGEST_STEP : LONGEST_START;
-        write_unknown(&trial->unknowns[k], start[k] + fmin(fmax(step[k], -most), most));
-    }
-}
-
-/* One step of Levenberg and Marquardt by the slopes at hand: the least damping that gets lower. residual and *square
- * are those of `here` and move with it; they stay where none does. */
-static groom_status descend(struct matching *matching, struct trial *here, const double *jacobian,
-                            double residual[MOMENTS_COUNT], double *square, const struct groom_context *context,
-                            struct groom_diag *diag)
-{
-    static const double dampings[] = {1e-3, 1e-1, 3, 100};
-    double step[MOST_PARAMETERS], start[MOST_PARAMETERS], other[MOMENTS_COUNT];
-    float kept[MOST_PARAMETERS];
-    for (uint32_t k = 0; k < here->n_unknowns; k++) {
-        start[k] = read_unknown(&here->unknowns[k]);
-        kept[k] = *here->unknowns[k].value;
-    }
-    for (int d = 0; d < 4; d++) {
-        if (progress_cancelled(context))
-            return groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage operators");
-        if (!solve_step(jacobian, residual, here->n_unknowns, dampings[d], step))
-            continue;
-        take_step(here, start, step);
-        groom_status st = residual_of(matching, here, other, context, diag);
-        if (st != GROOM_OK)
-            return st;
-        if (square_of(other) < *square) {
-            *square = square_of(other);
-            memcpy(residual, other, sizeof other);
-            return GROOM_OK;
-        }
-    }
-    for (uint32_t k = 0; k < here->n_unknowns; k++)
-        *here->unknowns[k].value = kept[k];
-    return GROOM_OK;
-}
-
-/* Slopes at `here`, and up to n_steps by them, which move it. *ended where they gain less than this share of the misfit. */
-static groom_status refine(struct matching *matching, struct trial *here, int both_sides, uint32_t n_steps, double least,
-                           double *square, int *ended, const struct groom_context *context, struct groom_diag *diag)
-{
-    const struct groom_allocator *allocator = memory_allocator(context);
-    double residual[MOMENTS_COUNT], before, last;
-    double *jacobian = memory_array(allocator, MOST_PARAMETERS, MOMENTS_COUNT * sizeof *jacobian);
-    groom_status st = GROOM_OK;
-    if (!jacobian)
-        return groom_fail(diag, GROOM_ENOMEM, "no memory to refine operators");
-    if ((st = residual_of(matching, here, residual, context, diag)) != GROOM_OK ||
-        (st = differentiate(matching, here, residual, both_sides, jacobian, context, diag)) != GROOM_OK)
-        goto out;
-    before = last = *square = square_of(residual);
-    for (uint32_t k = 0; k < n_steps; k++, last = *square)
-        if ((st = descend(matching, here, jacobian, residual, square, context, diag)) != GROOM_OK)
-            goto out;
-        else if (last - *square < least * last)
-            break;
-    *ended = before - *square < least * before;
-out:
-    memory_release(allocator, jacobian, MOST_PARAMETERS, MOMENTS_COUNT * sizeof *jacobian);
-    return st;
-}
+/* --- between rounds of stage randoms -------------------------------------------------------------- */
 
 groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequencies_known,
                               const struct groom_context *context, struct groom_diag *diag)
@@ -374,7 +95,7 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequ
     struct trial here;
     double square;
     int ended = 0;
-    trial_init_known(fit, frequencies_known, &here);
+    trial_init(fit, frequencies_known, &here);
     if (here.n_unknowns == 0 || fit->n < FEWEST_STRANDS)
         return GROOM_OK;
     /* where axes are not known, curls were found along others than those that are matched along */
@@ -384,7 +105,7 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequ
         return st;
     for (uint32_t k = 0, last = 0; st == GROOM_OK && !last && k < n_steps; k++) {
         last = ended || k + 1 == n_steps;
-        if ((st = refine(matching, &here, (int)last, STEPS_AT_HAND, CONVERGED_LAST, &square, &ended, context, diag)) == GROOM_OK)
+        if ((st = trial_refine(matching, &here, (int)last, STEPS_AT_HAND, CONVERGED_LAST, &square, &ended, context, diag)) == GROOM_OK)
             trial_keep(&here, fit);
     }
     matching_destroy(matching);
@@ -507,12 +228,12 @@ static uint32_t pairs_of(const struct groom_fit *fit)
 static void begin(struct groom_fit *fit)
 {
     struct trial trial;
-    trial_init(fit, &trial);
+    begin_trial(fit, &trial);
     for (uint32_t k = 0; k < trial.n_unknowns; k++) {
         const struct unknown *unknown = &trial.unknowns[k];
         double least = fmax((unknown->random ? LEAST_RANDOM : LEAST_START) * unknown->initial, unknown->minimum);
         if (unknown->logarithmic && *unknown->value < least)
-            write_unknown(unknown, log(least));
+            trial_write(unknown, log(least));
     }
     trial_keep(&trial, fit);
     fit->iteration = next_searched(&trial, 0);
@@ -526,8 +247,8 @@ static groom_status search_step(struct groom_fit *fit, struct matching *matching
     struct trial trial;
     double square;
     groom_status st;
-    trial_init(fit, &trial);
-    if ((st = misfit(matching, &trial, &square, context, diag)) != GROOM_OK ||
+    begin_trial(fit, &trial);
+    if ((st = trial_misfit(matching, &trial, &square, context, diag)) != GROOM_OK ||
         (st = search_one(matching, &trial, fit->iteration, &square, context, diag)) != GROOM_OK)
         return st;
     trial_keep(&trial, fit);
@@ -563,10 +284,10 @@ static groom_status refine_step(struct groom_fit *fit, struct matching *matching
     struct trial here;
     double square = 0;
     int converged = 0, moved = 0, last = fit->iteration + 1 >= fit->options.stages.operators.refinements;
-    trial_init(fit, &here);
-    groom_status st = refine(matching, &here, 0, 1, CONVERGED, &square, &converged, context, diag);
+    begin_trial(fit, &here);
+    groom_status st = trial_refine(matching, &here, 0, 1, CONVERGED, &square, &converged, context, diag);
     if (st == GROOM_OK && converged && floor_of(fit) <= FLOOR_LAST) /* at the minimum, as one side has it */
-        st = refine(matching, &here, 1, 1, CONVERGED, &square, &converged, context, diag);
+        st = trial_refine(matching, &here, 1, 1, CONVERGED, &square, &converged, context, diag);
     if (st != GROOM_OK)
         return st;
     trial_keep(&here, fit);
@@ -601,7 +322,7 @@ static groom_status match_step(struct groom_fit *fit, const struct groom_context
 {
     struct trial before;
     uint32_t axes = fit->axes;
-    trial_init_known(fit, 0, &before);
+    trial_init(fit, 0, &before);
     groom_status st = try_step(fit, context, diag);
     if (st != GROOM_OK) {
         trial_keep(&before, fit);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "fit/axes.h"
+#include "fit/frame.h"
 #include "fit/matching.h"
 #include "groom/context.h"
 #include "tests/support/fits.h"
@@ -34,7 +35,7 @@ START_TEST(a_quarter_turn_about_z)
 {
     const double about_z[3] = {0, 0, acos(-1) / 2}, expected[3][3] = {{0, -1, 0}, {1, 0, 0}, {0, 0, 1}};
     double r[3][3];
-    axes_rotation(about_z, r);
+    frame_rotation(about_z, r);
     is_rotation((const double (*)[3])r);
     for (int k = 0; k < 9; k++)
         ck_assert_double_eq_tol(r[k / 3][k % 3], expected[k / 3][k % 3], 1e-12);
@@ -45,12 +46,12 @@ START_TEST(a_rotation_leaves_its_axis_and_turns_by_its_length)
 {
     const double vector[3] = {0.3, -0.5, 0.9};
     double r[3][3], angle = sqrt(0.09 + 0.25 + 0.81);
-    axes_rotation(vector, r);
+    frame_rotation(vector, r);
     is_rotation((const double (*)[3])r);
     for (int i = 0; i < 3; i++)
         ck_assert_double_eq_tol(r[i][0] * vector[0] + r[i][1] * vector[1] + r[i][2] * vector[2], vector[i], 1e-12);
     ck_assert_double_eq_tol(r[0][0] + r[1][1] + r[2][2], 1 + 2 * cos(angle), 1e-12);
-    axes_rotation((const double[3]){0, 0, 0}, r);
+    frame_rotation((const double[3]){0, 0, 0}, r);
     ck_assert_double_eq_tol(r[0][0] + r[1][1] + r[2][2], 3, 1e-12);
 }
 END_TEST
@@ -168,7 +169,7 @@ START_TEST(operators_are_matched_along_the_axes_that_are_asked_for)
     struct matching_wanted wanted = {.n_pairs = PAIRS, .floor = 0.03};
     struct matching *matching;
     double before[MOMENTS_COUNT], turned[MOMENTS_COUNT], after[MOMENTS_COUNT], round[3][3];
-    axes_turned(invariance_as_it_is, (const float[3]){0, (float)(2 * acos(-1)), 0}, round);
+    frame_turned(invariance_as_it_is, (const float[3]){0, (float)(2 * acos(-1)), 0}, round);
     is_rotation((const double (*)[3])round);
     ck_ok(matching_create(fit, &wanted, NULL, &matching, NULL));
     ck_ok(matching_residual(matching, fit->groom->operators, invariance_as_it_is, before, NULL, NULL));
