@@ -3,16 +3,31 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/progress.h"
 #include "fit/frame.h"
-#include "fit/matching.h"
+#include "fit/trial.h"
 
-#define FLOOR 0.03      /* of the statistics: coarse enough for parameters that were told along other axes */
-#define AS_GOOD 0.75    /* of a misfit: what is more likely to begin with stays */
+#define FLOOR 0.03       /* of the statistics: coarse enough for parameters that were told along other axes */
+#define FLOOR_FINE 0.01  /* for those that go along with the axes */
+#define WORTH_TURNING 2.5 /* times the least misfit: axes that may still be the best once they are turned, */
+#define WORTH_TRYING 1.6 /* or have parameters of their own */
+#define APART 0.5        /* radians between axes that are taken for others */
+#define MOST_TURNED 5    /* axes that are turned until they fit, */
+#define MOST_TRIED 4     /* and that are tried with parameters of their own, */
+#define ROUNDS 2         /* by so many slopes, */
+#define STEPS 2          /* and steps by each, */
+#define LEAST_GAIN 1e-2  /* which are to gain this share of the misfit */
 #define QUARTERS 24
-#define AROUND 8        /* turns about where the hair falls to: its front is told less well than that */
-#define HAIRS (2 * AROUND)
+#define AROUND 8         /* turns about one of the hair's own axes */
+#define HAIRS (4 * AROUND)
 #define PI 3.14159265358979323846
+
+/* Of a misfit: what is more likely to begin with stays where others are not much better. */
+static const double prior[] = {[AXES_UNKNOWN] = 1, [AXES_GIVEN] = 0.72, [AXES_QUARTER] = 0.85, [AXES_NEAR] = 1};
+
+struct candidate {
+    double frame[3][3], square; /* of the misfit, by its prior */
+    uint32_t axes;
+};
 
 /* --- what comes into question ------------------------------------------------------------------- */
 
@@ -23,67 +38,207 @@ static struct vec unit_of(int side)
 }
 
 /* The file's axes, then these turned by quarters. */
-static void list_quarters(double frame[QUARTERS][3][3])
+static void list_quarters(struct candidate list[QUARTERS])
 {
-    int n = 0;
+    uint32_t n = 0;
     for (int x = 0; x < 6; x++)
         for (int y = 0; y < 6; y++)
-            if (x / 2 != y / 2)
-                frame_of(unit_of(x), unit_of(y), frame[n++]);
+            if (x / 2 != y / 2) {
+                list[n].axes = n == 0 ? AXES_GIVEN : AXES_QUARTER;
+                frame_of(unit_of(x), unit_of(y), list[n++].frame);
+            }
 }
 
-/* The hair's own, up and down, turned about y. */
-static void list_hairs(const double own[3][3], double frame[HAIRS][3][3])
+/* The hair's own, turned about what they tell best: where hair falls, up, y; where it stands out to all sides, the middle
+ * of the head, which its roots lie alike on both sides of, across x. And the same upside down. */
+static void list_hairs(const double own[3][3], struct candidate list[HAIRS])
 {
     for (int k = 0; k < HAIRS; k++) {
-        double angle = 2 * PI * k / AROUND, up = k < AROUND ? 1 : -1, turn[3][3];
-        frame_of((struct vec){cos(angle), 0, -up * sin(angle)}, (struct vec){0, up, 0}, turn);
-        frame_multiply((const double (*)[3])turn, own, frame[k]);
+        double angle = 2 * PI * (k / 4) / AROUND, flip = k % 2 ? -1 : 1, turn[3][3];
+        if (k / 2 % 2)
+            frame_of((struct vec){cos(angle), 0, -flip * sin(angle)}, (struct vec){0, flip, 0}, turn);
+        else
+            frame_of((struct vec){flip, 0, 0}, (struct vec){0, cos(angle), sin(angle)}, turn);
+        frame_multiply((const double (*)[3])turn, own, list[k].frame);
+        list[k].axes = AXES_NEAR;
     }
 }
 
 /* --- the choice ------------------------------------------------------------------------------------ */
 
-static groom_status misfit_along(struct matching *matching, const struct groom_fit *fit, const double frame[3][3], double *square,
-                                 const struct groom_context *context, struct groom_diag *diag)
+static double angle_between(const double a[3][3], const double b[3][3])
 {
-    double residual[MOMENTS_COUNT];
-    if (progress_cancelled(context))
-        return groom_fail(diag, GROOM_ECANCELLED, "cancelled while the hair's axes were looked for");
-    groom_status st = matching_residual(matching, fit->groom->operators, frame, residual, context, diag);
-    *square = 0;
-    for (int f = 0; st == GROOM_OK && f < MOMENTS_COUNT; f++)
-        *square += residual[f] * residual[f];
+    double trace = 0;
+    for (int k = 0; k < 9; k++)
+        trace += a[k / 3][k % 3] * b[k / 3][k % 3];
+    return acos(fmin(fmax((trace - 1) / 2, -1), 1));
+}
+
+static int is_apart(const struct candidate *list, uint32_t n, const struct candidate *one)
+{
+    for (uint32_t i = 0; i < n; i++)
+        if (list[i].axes == one->axes &&
+            angle_between((const double (*)[3])list[i].frame, (const double (*)[3])one->frame) < APART)
+            return 0;
+    return 1;
+}
+
+/* The first of those that are the best. */
+static uint32_t best_of(const struct candidate *list, uint32_t n)
+{
+    uint32_t best = 0;
+    for (uint32_t k = 1; k < n; k++)
+        best = list[k].square < list[best].square ? k : best;
+    return best;
+}
+
+/* Adds the best of others that are apart from each other and from all in the list, at most this much off, until it is
+ * `most` long. returns how long it is */
+static uint32_t add_best(struct candidate *list, uint32_t n, uint32_t most, const struct candidate *other, uint32_t n_others,
+                         double farthest)
+{
+    while (n < most) {
+        uint32_t best = n_others;
+        for (uint32_t k = 0; k < n_others; k++)
+            if (other[k].square <= farthest && is_apart(list, n, &other[k]) && (best == n_others || other[k].square < other[best].square))
+                best = k;
+        if (best == n_others)
+            break;
+        list[n++] = other[best];
+    }
+    return n;
+}
+
+static groom_status weigh(const struct groom_fit *fit, struct matching *matching, struct candidate *list, uint32_t n,
+                          const struct groom_context *context, struct groom_diag *diag)
+{
+    struct trial trial;
+    groom_status st = GROOM_OK;
+    trial_init(fit, 0, &trial);
+    for (uint32_t k = 0; st == GROOM_OK && k < n; k++) {
+        memcpy(trial.frame, list[k].frame, sizeof trial.frame);
+        st = trial_misfit(matching, &trial, &list[k].square, context, diag);
+        list[k].square *= prior[list[k].axes];
+    }
     return st;
 }
 
-/* The least of the first n. */
-static int best_of(const double *square, int n)
+/* Slopes and steps until they gain nothing. */
+static groom_status settle(struct matching *matching, struct trial *trial, double *square, const struct groom_context *context,
+                           struct groom_diag *diag)
 {
-    int best = 0;
-    for (int k = 1; k < n; k++)
-        best = square[k] < square[best] ? k : best;
-    return best;
+    groom_status st = GROOM_OK;
+    for (int round = 0, ended = 0; st == GROOM_OK && !ended && round < ROUNDS; round++)
+        st = trial_refine(matching, trial, 0, STEPS, LEAST_GAIN, square, &ended, context, diag);
+    return st;
+}
+
+/* Turned until they fit, with the parameters that there are. */
+static groom_status turn(const struct groom_fit *fit, struct matching *matching, struct candidate *list, uint32_t n,
+                         const struct groom_context *context, struct groom_diag *diag)
+{
+    struct trial trial;
+    groom_status st = GROOM_OK;
+    for (uint32_t k = 0; st == GROOM_OK && k < n; k++) {
+        trial_init(fit, 0, &trial);
+        trial.n_unknowns = 0;
+        trial_let_turn(&trial);
+        memcpy(trial.frame, list[k].frame, sizeof trial.frame);
+        st = settle(matching, &trial, &list[k].square, context, diag);
+        frame_turned((const double (*)[3])trial.frame, trial.turn, list[k].frame);
+    }
+    return st;
+}
+
+/* With parameters that go along with the axes, and with axes that go along, where these are near the hair's. */
+static groom_status try_along(const struct groom_fit *fit, struct matching *matching, struct candidate *candidate,
+                              struct trial *trial, const struct groom_context *context, struct groom_diag *diag)
+{
+    double square = 0;
+    trial_init(fit, 0, trial);
+    if (candidate->axes == AXES_NEAR)
+        trial_let_turn(trial);
+    memcpy(trial->frame, candidate->frame, sizeof trial->frame);
+    groom_status st = settle(matching, trial, &square, context, diag);
+    candidate->square = prior[candidate->axes] * square;
+    return st;
+}
+
+/* What may be the best: of the file's axes and quarter turns, the best; what there was before; and of the hair's own, turned
+ * until they fit, those that are apart.
+ * found  [MOST_TRIED] out */
+static groom_status look_around(const struct groom_fit *fit, struct matching *matching, struct candidate *found, uint32_t *n_found,
+                                const struct groom_context *context, struct groom_diag *diag)
+{
+    struct candidate quarter[QUARTERS], hair[HAIRS], turned[MOST_TURNED], now = {.axes = fit->axes};
+    uint32_t n = 0, n_turned;
+    memcpy(now.frame, fit->frame, sizeof now.frame);
+    list_quarters(quarter);
+    list_hairs(fit->own, hair);
+    groom_status st = weigh(fit, matching, quarter, QUARTERS, context, diag);
+    if (st == GROOM_OK)
+        st = weigh(fit, matching, hair, HAIRS, context, diag);
+    if (st == GROOM_OK)
+        st = weigh(fit, matching, &now, 1, context, diag);
+    if (st != GROOM_OK)
+        return st;
+    if (fit->axes != AXES_UNKNOWN)
+        found[n++] = now;
+    n = add_best(found, n, n + 1, quarter, QUARTERS, INFINITY);
+    double farthest = WORTH_TURNING * found[best_of(found, n)].square;
+    n_turned = add_best(turned, 0, MOST_TURNED, hair, HAIRS, farthest);
+    if ((st = turn(fit, matching, turned, n_turned, context, diag)) == GROOM_OK)
+        *n_found = add_best(found, n, MOST_TRIED, turned, n_turned, INFINITY);
+    return st;
+}
+
+/* Leaves out what is not worth trying. returns how many are left */
+static uint32_t leave_worthy(struct candidate *found, uint32_t n)
+{
+    double farthest = WORTH_TRYING * found[best_of(found, n)].square;
+    uint32_t left = 0;
+    for (uint32_t k = 0; k < n; k++)
+        if (found[k].square <= farthest)
+            found[left++] = found[k];
+    return left;
+}
+
+/* Into the fit, with what was tried along it, unless that is where it was. */
+static void take(struct groom_fit *fit, const struct candidate *best, const struct trial *tried)
+{
+    int moved = memcmp(best->frame, fit->frame, sizeof fit->frame) != 0;
+    fit->axes = best->axes;
+    memcpy(fit->frame, best->frame, sizeof fit->frame);
+    if (moved && tried)
+        trial_keep(tried, fit);
 }
 
 groom_status axes_choose(struct groom_fit *fit, uint32_t n_pairs, const struct groom_context *context, struct groom_diag *diag)
 {
-    double frame[QUARTERS + HAIRS][3][3], square[QUARTERS + HAIRS];
+    struct candidate found[MOST_TRIED];
+    struct trial trial[MOST_TRIED];
     struct matching_wanted wanted = {.n_pairs = n_pairs, .floor = FLOOR};
     struct matching *matching = NULL;
+    uint32_t n = 0;
     groom_status st = matching_create(fit, &wanted, context, &matching, diag);
-    list_quarters(frame);
-    list_hairs((const double (*)[3])fit->frame, frame + QUARTERS);
-    for (int k = 0; st == GROOM_OK && k < QUARTERS + HAIRS; k++)
-        st = misfit_along(matching, fit, (const double (*)[3])frame[k], &square[k], context, diag);
-    if (st == GROOM_OK) {
-        int best = best_of(square, QUARTERS + HAIRS), quarter = best_of(square, QUARTERS);
-        best = AS_GOOD * square[quarter] <= square[best] ? quarter : best;
-        best = AS_GOOD * square[0] <= square[best] ? 0 : best;
-        memcpy(fit->frame, frame[best], sizeof fit->frame);
-        fit->axes = best == 0 ? AXES_GIVEN : best < QUARTERS ? AXES_QUARTER : AXES_NEAR;
-    }
+    if (st == GROOM_OK)
+        st = look_around(fit, matching, found, &n, context, diag);
     matching_destroy(matching);
+    if (st != GROOM_OK)
+        return st;
+    n = leave_worthy(found, n);
+    if (n == 1 || fit->axes == AXES_UNKNOWN) { /* the first time, parameters are rough */
+        take(fit, &found[best_of(found, n)], NULL);
+        return GROOM_OK;
+    }
+    matching = NULL;
+    wanted.floor = FLOOR_FINE;
+    st = matching_create(fit, &wanted, context, &matching, diag);
+    for (uint32_t k = 0; st == GROOM_OK && k < n; k++)
+        st = try_along(fit, matching, &found[k], &trial[k], context, diag);
+    matching_destroy(matching);
+    if (st == GROOM_OK)
+        take(fit, &found[best_of(found, n)], &trial[best_of(found, n)]);
     return st;
 }
 

@@ -11,9 +11,10 @@
 
 #include "fit/state.h"
 
-/* Sets fit->frame and fit->axes by which axes bring the statistics nearest to the target's, with the parameters that there
- * are: the file's own, where they are about as good as any; these by quarter turns, where another axis was up; or those of
- * the hair as it falls (canonical.h), from where they are looked for along with the parameters.
+/* Sets fit->frame and fit->axes by which axes bring the statistics nearest to the target's: the file's own, where they are
+ * about as good as any; these by quarter turns, where another axis was up; or others, near those that the hair itself tells
+ * (canonical.h). The first time parameters are rough, and are left as they are; later, what may be best is tried with
+ * parameters that go along, which it takes with it where the axes change: told along other axes, parameters speak for those.
  * n_pairs  that tell
  * returns  GROOM_OK, GROOM_ENOMEM, GROOM_ECANCELLED; the fit is untouched on error */
 GROOM_MUST_CHECK groom_status axes_choose(struct groom_fit *fit, uint32_t n_pairs, const struct groom_context *context,

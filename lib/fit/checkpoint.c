@@ -179,6 +179,7 @@ static void pen_state(struct pen *pen, struct groom_fit *fit)
     pen_u32(pen, &fit->iteration);
     pen_bytes(pen, fit->frame, sizeof fit->frame);
     pen_u32(pen, &fit->axes);
+    pen_u32(pen, &fit->axes_looks);
     pen_u32(pen, &fit->n_guides);
     if (fit->n_guides > 0)
         pen_clusters(pen, fit);
@@ -259,7 +260,7 @@ static int sound_report(const struct groom_fit_report *report)
 
 static int sound_axes(const struct groom_fit *fit)
 {
-    int sound = fit->axes <= AXES_NEAR;
+    int sound = fit->axes <= AXES_NEAR && fit->axes_looks <= 2;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             sound &= fabs(fit->frame[i][j]) <= 1.001;

@@ -98,6 +98,8 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequ
     trial_init(fit, frequencies_known, &here);
     if (here.n_unknowns == 0 || fit->n < FEWEST_STRANDS)
         return GROOM_OK;
+    if (fit->axes == AXES_NEAR)
+        trial_let_turn(&here);
     /* where axes are not known, curls were found along others than those that are matched along */
     struct matching_wanted wanted = {fit->options.stages.operators.pairs, FLOOR_LAST, fit->axes != AXES_UNKNOWN, 1};
     groom_status st = matching_create(fit, &wanted, context, &matching, diag);
@@ -108,6 +110,7 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequ
         if ((st = trial_refine(matching, &here, (int)last, STEPS_AT_HAND, CONVERGED_LAST, &square, &ended, context, diag)) == GROOM_OK)
             trial_keep(&here, fit);
     }
+    axes_give(fit);
     matching_destroy(matching);
     return st;
 }
@@ -266,6 +269,7 @@ static groom_status choose_axes(struct groom_fit *fit, int *moved, const struct 
     memcpy(before, fit->frame, sizeof before);
     groom_status st = axes_choose(fit, some_pairs(fit), context, diag);
     *moved = memcmp(before, fit->frame, sizeof before) != 0;
+    fit->axes_looks += st == GROOM_OK;
     return st;
 }
 
@@ -273,7 +277,7 @@ static groom_status choose_axes(struct groom_fit *fit, int *moved, const struct 
 static groom_status axes_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     int moved, last_look = fit->iteration + LAST_LOOK == fit->options.stages.operators.refinements;
-    if (fit->phase != REFINE || floor_of(fit) > AXES_FLOOR || (fit->axes != AXES_UNKNOWN && !last_look))
+    if (fit->phase != REFINE || floor_of(fit) > AXES_FLOOR || fit->axes_looks >= (last_look ? 2 : 1))
         return GROOM_OK;
     return choose_axes(fit, &moved, context, diag);
 }
@@ -292,7 +296,7 @@ static groom_status refine_step(struct groom_fit *fit, struct matching *matching
         return st;
     trial_keep(&here, fit);
     converged &= fit->axes != AXES_UNKNOWN && floor_of(fit) <= FLOOR_LAST;
-    if (converged && !last && (st = choose_axes(fit, &moved, context, diag)) != GROOM_OK)
+    if (converged && !last && fit->axes_looks < 2 && (st = choose_axes(fit, &moved, context, diag)) != GROOM_OK)
         return st;
     report_progress(&fit->report, "operators", "misfit", square, count_unknowns(fit) + fit->iteration, context);
     fit->iteration++;
@@ -321,12 +325,13 @@ static groom_status try_step(struct groom_fit *fit, const struct groom_context *
 static groom_status match_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     struct trial before;
-    uint32_t axes = fit->axes;
+    uint32_t axes = fit->axes, looks = fit->axes_looks;
     trial_init(fit, 0, &before);
     groom_status st = try_step(fit, context, diag);
     if (st != GROOM_OK) {
         trial_keep(&before, fit);
         fit->axes = axes;
+        fit->axes_looks = looks;
     }
     axes_give(fit);
     return st;

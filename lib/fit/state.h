@@ -32,6 +32,7 @@ struct groom_fit {
     float centre[3];           /* of all points, metres */
     float scale;               /* metres: root mean square distance of all points from the centre */
     float ordinary;            /* size of this scalp over that of an ordinary one: 1 for real hair in metres */
+    double own[3][3];          /* rows: axes that turn with the hair (canonical.h) */
     struct {                   /* every strand of the capture, where cameras see some only (unseen.h); else 0 */
         uint32_t n;
         uint32_t *seen;        /* [groom_fit.n] which those of the target are, rising; room for n */
@@ -45,6 +46,7 @@ struct groom_fit {
     uint32_t *cluster_of;             /* [n] */
     double frame[3][3];               /* rows: axes along which operators are matched (axes.h); the hair's own to begin with */
     uint32_t axes;                    /* enum fit_axes: what is known of them */
+    uint32_t axes_looks;              /* how often they were looked for: once roughly, and once more */
     struct groom *groom;              /* NULL until there are guides */
     uint32_t n_moments;               /* of a gradient descent under way: see fit/adam.h; 0: there is none */
     float *moments;                   /* [n_moments] */

@@ -328,7 +328,8 @@ static groom_status fill_target(struct groom_fit *fit, const struct groom_strand
     if (progress_cancelled(context))
         return groom_fail(diag, GROOM_ECANCELLED, "cancelled while the target was prepared");
     normalize_target(fit, outlier, context);
-    canonical_frame(fit, outlier, fit->frame);
+    canonical_frame(fit, outlier, fit->own);
+    memcpy(fit->frame, fit->own, sizeof fit->frame);
     note_joins(fit);
     return GROOM_OK;
 }
