@@ -101,7 +101,8 @@ groom_status moments_plan_init(struct moments_plan *plan, const struct groom_con
 
 /* --- spectra ---------------------------------------------------------------------------- */
 
-/* Transforms of a strand's segments: over the whole, then over each third. */
+/* Transforms of a strand's segments: over the whole, then over each third. Thirds are there where somebody asks: at every
+ * other frequency, and at the peak. */
 struct spectrum { float re[1 + MOMENTS_WINDOWS][3][N_FREQ], im[1 + MOMENTS_WINDOWS][3][N_FREQ]; };
 
 /* Hann's window from `from` to `to`; 0 outside. */
@@ -110,88 +111,129 @@ static float hann(double at, double from, double to)
     return at <= from || at >= to ? 0 : (float)(0.5 - 0.5 * cos(2 * PI * (at - from) / (to - from)));
 }
 
-struct windows { float weight[MOMENTS_MOST_VERTICES][1 + MOMENTS_WINDOWS]; };
+struct windows {
+    float weight[1 + MOMENTS_WINDOWS][MOMENTS_MOST_VERTICES]; /* of each segment */
+    uint32_t first[1 + MOMENTS_WINDOWS], end[1 + MOMENTS_WINDOWS]; /* segments that have any */
+};
 
 static void make_windows(uint32_t m, struct windows *windows)
 {
-    for (uint32_t j = 0; j + 1 < m; j++) {
-        double v = (j + 0.5) / (m - 1);
-        windows->weight[j][0] = hann(v, 0, 1);
-        for (int w = 0; w < MOMENTS_WINDOWS; w++)
-            windows->weight[j][1 + w] = hann(v, w / 6.0, w / 6.0 + 1 / 3.0);
+    for (int w = 0; w < 1 + MOMENTS_WINDOWS; w++) {
+        double from = w == 0 ? 0 : (w - 1) / 6.0, to = w == 0 ? 1 : from + 1 / 3.0;
+        float *weight = windows->weight[w];
+        for (uint32_t j = 0; j + 1 < m; j++)
+            weight[j] = hann((j + 0.5) / (m - 1), from, to);
+        windows->first[w] = 0;
+        windows->end[w] = m - 1;
+        while (windows->first[w] < windows->end[w] && weight[windows->first[w]] == 0)
+            windows->first[w]++;
+        while (windows->end[w] > windows->first[w] && weight[windows->end[w] - 1] == 0)
+            windows->end[w]--;
     }
 }
 
-/* Segments of both strands of a pair at the same turns a segment, so that their difference means something. */
 /* Frequencies side by side: the compiler's own vector type, element by element, as wide as a register. */
 #define SIDE_BY_SIDE 8
+#define GROUPS (N_FREQ / SIDE_BY_SIDE)
 typedef float waves __attribute__((vector_size(sizeof(float) * SIDE_BY_SIDE)));
 
-LANES_INLINE void add_waves(float *to, waves wave, float e)
-{
-    waves sum;
-    memcpy(&sum, to, sizeof sum);
-    sum += wave * e;
-    memcpy(to, &sum, sizeof sum);
-}
+/* In which group a frequency is, and where: those that thirds are asked about together. */
+static int group_of(int q) { return (q + 1) % GROUPS; }
+static int lane_of(int q) { return q / GROUPS; }
 
-/* Of frequencies first .. first + SIDE_BY_SIDE - 1. */
-LANES_INLINE void transform_some(const struct windows *windows, const float (*points)[3], uint32_t m, const double *turns,
-                                 int first, struct spectrum *spectrum)
+/* The waves at a group's frequencies at each segment, which both strands of a pair are compared with. */
+struct wave_table { waves cosine[MOMENTS_MOST_VERTICES], sine[MOMENTS_MOST_VERTICES]; };
+
+LANES_INLINE void make_waves(uint32_t m, const double turns[N_FREQ], int group, struct wave_table *table)
 {
     waves cosine = {0}, sine = {0}, step_cosine = {0}, step_sine = {0};
-    for (int q = 0; q < SIDE_BY_SIDE; q++) {
-        cosine[q] = 1;
-        step_cosine[q] = (float)cos(2 * PI * turns[first + q]);
-        step_sine[q] = (float)sin(2 * PI * turns[first + q]);
-    }
+    for (int q = 0; q < N_FREQ; q++)
+        if (group_of(q) == group) {
+            cosine[lane_of(q)] = 1;
+            step_cosine[lane_of(q)] = (float)cos(2 * PI * turns[q]);
+            step_sine[lane_of(q)] = (float)sin(2 * PI * turns[q]);
+        }
     for (uint32_t j = 0; j + 1 < m; j++) {
-        const float *weight = windows->weight[j];
-        for (int w = 0; w < 1 + MOMENTS_WINDOWS; w++)
-            for (int c = 0; c < 3 && weight[w] != 0; c++) {
-                float e = weight[w] * (points[j + 1][c] - points[j][c]);
-                add_waves(spectrum->re[w][c] + first, cosine, e);
-                add_waves(spectrum->im[w][c] + first, sine, e);
-            }
+        table->cosine[j] = cosine;
+        table->sine[j] = sine;
         waves next = cosine * step_cosine - sine * step_sine;
         sine = sine * step_cosine + cosine * step_sine;
         cosine = next;
     }
 }
 
-LANES_INLINE void transform_body(const struct windows *windows, const float (*points)[3], uint32_t m,
-                                 const double turns[N_FREQ], struct spectrum *spectrum)
+/* Over one window. */
+LANES_INLINE void add_window(const struct windows *windows, int w, const float (*points)[3], const struct wave_table *table,
+                             waves re[3], waves im[3])
 {
-    memset(spectrum, 0, sizeof *spectrum);
-    for (int first = 0; first < N_FREQ; first += SIDE_BY_SIDE)
-        transform_some(windows, points, m, turns, first, spectrum);
+    const float *weight = windows->weight[w];
+    waves rx = {0}, ry = {0}, rz = {0}, ix = {0}, iy = {0}, iz = {0};
+    for (uint32_t j = windows->first[w]; j < windows->end[w]; j++) {
+        float x = weight[j] * (points[j + 1][0] - points[j][0]), y = weight[j] * (points[j + 1][1] - points[j][1]);
+        float z = weight[j] * (points[j + 1][2] - points[j][2]);
+        waves cosine = table->cosine[j], sine = table->sine[j];
+        rx += cosine * x, ry += cosine * y, rz += cosine * z;
+        ix += sine * x, iy += sine * y, iz += sine * z;
+    }
+    re[0] = rx, re[1] = ry, re[2] = rz;
+    im[0] = ix, im[1] = iy, im[2] = iz;
 }
 
-static void transform_baseline(const struct windows *windows, const float (*points)[3], uint32_t m,
-                               const double turns[N_FREQ], struct spectrum *spectrum)
+LANES_INLINE void transform_body(const struct windows *windows, const float (*points)[3], const struct wave_table *table,
+                                 int group, int n_windows, struct spectrum *spectrum)
 {
-    transform_body(windows, points, m, turns, spectrum);
+    for (int w = 0; w < n_windows; w++) {
+        waves re[3], im[3];
+        add_window(windows, w, points, table, re, im);
+        for (int c = 0; c < 3; c++)
+            for (int q = 0; q < N_FREQ; q++)
+                if (group_of(q) == group) {
+                    spectrum->re[w][c][q] = re[c][lane_of(q)];
+                    spectrum->im[w][c][q] = im[c][lane_of(q)];
+                }
+    }
+}
+
+struct pair_points { const float (*a)[3], (*b)[3]; };
+
+LANES_INLINE void transform_pair_body(const struct windows *windows, struct pair_points pair, uint32_t m, uint32_t peak,
+                                      const double turns[N_FREQ], struct spectrum *of_a, struct spectrum *of_b)
+{
+    struct wave_table table;
+    for (int group = 0; group < GROUPS; group++) {
+        int n_windows = group == group_of(1) || group == group_of((int)peak) ? 1 + MOMENTS_WINDOWS : 1;
+        make_waves(m, turns, group, &table);
+        transform_body(windows, pair.a, &table, group, n_windows, of_a);
+        transform_body(windows, pair.b, &table, group, n_windows, of_b);
+    }
+}
+
+static void transform_pair_baseline(const struct windows *windows, struct pair_points pair, uint32_t m, uint32_t peak,
+                                    const double turns[N_FREQ], struct spectrum *of_a, struct spectrum *of_b)
+{
+    transform_pair_body(windows, pair, m, peak, turns, of_a, of_b);
 }
 
 #if defined(__x86_64__)
-KERNEL_TARGET_AVX2 static void transform_avx2(const struct windows *windows, const float (*points)[3], uint32_t m,
-                                              const double turns[N_FREQ], struct spectrum *spectrum)
+KERNEL_TARGET_AVX2 static void transform_pair_avx2(const struct windows *windows, struct pair_points pair, uint32_t m,
+                                                   uint32_t peak, const double turns[N_FREQ], struct spectrum *of_a,
+                                                   struct spectrum *of_b)
 {
-    transform_body(windows, points, m, turns, spectrum);
+    transform_pair_body(windows, pair, m, peak, turns, of_a, of_b);
 }
 #endif
 
 /* The same bits in all variants: a frequency a lane, and no multiply-adds in one. */
-static void transform(const struct windows *windows, const float (*points)[3], uint32_t m, const double turns[N_FREQ],
-                      struct spectrum *spectrum)
+static void transform_pair(const struct windows *windows, struct pair_points pair, uint32_t m, uint32_t peak,
+                           const double turns[N_FREQ], struct spectrum *of_a, struct spectrum *of_b)
 {
 #if defined(__x86_64__)
     if (kernel_best_variant() == KERNEL_AVX2) {
-        transform_avx2(windows, points, m, turns, spectrum);
+        transform_pair_avx2(windows, pair, m, peak, turns, of_a, of_b);
         return;
     }
 #endif
-    transform_baseline(windows, points, m, turns, spectrum);
+    transform_pair_baseline(windows, pair, m, peak, turns, of_a, of_b);
 }
 
 /* Power in window w at frequency q over that of a straight strand of the same length. */
@@ -246,6 +288,7 @@ static void measure_phases(const struct moments_plan *plan, const struct spectru
     out[MOMENTS_PHASE + 2] = (float)fabs(turn_between(a, b));
 }
 
+/* Segments of both strands of a pair at the same turns a segment, so that their difference means something. */
 static void measure_spectra(const struct moments_plan *plan, const struct windows *windows, const float (*a)[3],
                             const float (*b)[3], double length, float *out)
 {
@@ -258,8 +301,7 @@ static void measure_spectra(const struct moments_plan *plan, const struct window
         turns[q] = f / (m - 1);
         use[q] = f >= LEAST_TURNS && turns[q] <= NYQUIST_SHARE;
     }
-    transform(windows, a, m, turns, &of_a);
-    transform(windows, b, m, turns, &of_b);
+    transform_pair(windows, (struct pair_points){a, b}, m, plan->peak, turns, &of_a, &of_b);
     for (int q = 0; q < N_FREQ; q++) {
         if (!use[q])
             continue;
