@@ -11,9 +11,11 @@
 #define WORTH_TURNING 2.5 /* times the least misfit: axes that may still be the best once they are turned, */
 #define WORTH_TRYING 1.6 /* or have parameters of their own */
 #define APART 0.5        /* radians between axes that are taken for others */
-#define MOST_TURNED 5    /* axes that are turned until they fit, */
+#define MOST_TURNED 5    /* axes that are turned until they fit, the first time; */
+#define LATER_TURNED 3   /* later, when there are some already; */
 #define MOST_TRIED 4     /* and that are tried with parameters of their own, */
 #define ROUNDS 2         /* by so many slopes, */
+#define BEHIND 1.25      /* times the least misfit: who is farther off after the first */
 #define STEPS 2          /* and steps by each, */
 #define LEAST_GAIN 1e-2  /* which are to gain this share of the misfit */
 #define QUARTERS 24
@@ -123,14 +125,10 @@ static groom_status weigh(const struct groom_fit *fit, struct matching *matching
     return st;
 }
 
-/* Slopes and steps until they gain nothing. */
-static groom_status settle(struct matching *matching, struct trial *trial, double *square, const struct groom_context *context,
-                           struct groom_diag *diag)
+static groom_status refine(struct matching *matching, struct trial *trial, double *square, int *ended,
+                           const struct groom_context *context, struct groom_diag *diag)
 {
-    groom_status st = GROOM_OK;
-    for (int round = 0, ended = 0; st == GROOM_OK && !ended && round < ROUNDS; round++)
-        st = trial_refine(matching, trial, 0, STEPS, LEAST_GAIN, square, &ended, context, diag);
-    return st;
+    return trial_refine(matching, trial, 0, STEPS, LEAST_GAIN, square, ended, context, diag);
 }
 
 /* Turned until they fit, with the parameters that there are. */
@@ -144,23 +142,10 @@ static groom_status turn(const struct groom_fit *fit, struct matching *matching,
         trial.n_unknowns = 0;
         trial_let_turn(&trial);
         memcpy(trial.frame, list[k].frame, sizeof trial.frame);
-        st = settle(matching, &trial, &list[k].square, context, diag);
+        for (int round = 0, ended = 0; st == GROOM_OK && !ended && round < ROUNDS; round++)
+            st = refine(matching, &trial, &list[k].square, &ended, context, diag);
         frame_turned((const double (*)[3])trial.frame, trial.turn, list[k].frame);
     }
-    return st;
-}
-
-/* With parameters that go along with the axes, and with axes that go along, where these are near the hair's. */
-static groom_status try_along(const struct groom_fit *fit, struct matching *matching, struct candidate *candidate,
-                              struct trial *trial, const struct groom_context *context, struct groom_diag *diag)
-{
-    double square = 0;
-    trial_init(fit, 0, trial);
-    if (candidate->axes == AXES_NEAR)
-        trial_let_turn(trial);
-    memcpy(trial->frame, candidate->frame, sizeof trial->frame);
-    groom_status st = settle(matching, trial, &square, context, diag);
-    candidate->square = prior[candidate->axes] * square;
     return st;
 }
 
@@ -186,7 +171,7 @@ static groom_status look_around(const struct groom_fit *fit, struct matching *ma
         found[n++] = now;
     n = add_best(found, n, n + 1, quarter, QUARTERS, INFINITY);
     double farthest = WORTH_TURNING * found[best_of(found, n)].square;
-    n_turned = add_best(turned, 0, MOST_TURNED, hair, HAIRS, farthest);
+    n_turned = add_best(turned, 0, fit->axes == AXES_UNKNOWN ? MOST_TURNED : LATER_TURNED, hair, HAIRS, farthest);
     if ((st = turn(fit, matching, turned, n_turned, context, diag)) == GROOM_OK)
         *n_found = add_best(found, n, MOST_TRIED, turned, n_turned, INFINITY);
     return st;
@@ -201,6 +186,35 @@ static uint32_t leave_worthy(struct candidate *found, uint32_t n)
         if (found[k].square <= farthest)
             found[left++] = found[k];
     return left;
+}
+
+/* Parameters that go along with the axes, and axes that go along, where these are near the hair's. Who falls behind is left
+ * where he is: those that lie wrong gain most by the first steps.
+ * returns  the best in *best */
+static groom_status try_along(const struct groom_fit *fit, struct matching *matching, struct candidate *found, uint32_t n,
+                              struct trial *trial, uint32_t *best, const struct groom_context *context, struct groom_diag *diag)
+{
+    groom_status st = GROOM_OK;
+    int ended[MOST_TRIED] = {0};
+    for (uint32_t k = 0; k < n; k++) {
+        trial_init(fit, 0, &trial[k]);
+        if (found[k].axes == AXES_NEAR)
+            trial_let_turn(&trial[k]);
+        memcpy(trial[k].frame, found[k].frame, sizeof trial[k].frame);
+        found[k].square = 0;
+    }
+    for (int round = 0; round < ROUNDS; round++) {
+        double farthest = BEHIND * found[best_of(found, n)].square;
+        for (uint32_t k = 0; st == GROOM_OK && k < n; k++) {
+            double square = 0;
+            if (ended[k] || found[k].square > farthest)
+                continue;
+            st = refine(matching, &trial[k], &square, &ended[k], context, diag);
+            found[k].square = prior[found[k].axes] * square;
+        }
+    }
+    *best = best_of(found, n);
+    return st;
 }
 
 /* Into the fit, with what was tried along it, unless that is where it was. */
@@ -219,7 +233,7 @@ groom_status axes_choose(struct groom_fit *fit, uint32_t n_pairs, const struct g
     struct trial trial[MOST_TRIED];
     struct matching_wanted wanted = {.n_pairs = n_pairs, .floor = FLOOR};
     struct matching *matching = NULL;
-    uint32_t n = 0;
+    uint32_t n = 0, best;
     groom_status st = matching_create(fit, &wanted, context, &matching, diag);
     if (st == GROOM_OK)
         st = look_around(fit, matching, found, &n, context, diag);
@@ -227,18 +241,19 @@ groom_status axes_choose(struct groom_fit *fit, uint32_t n_pairs, const struct g
     if (st != GROOM_OK)
         return st;
     n = leave_worthy(found, n);
+    best = best_of(found, n);
     if (n == 1 || fit->axes == AXES_UNKNOWN) { /* the first time, parameters are rough */
-        take(fit, &found[best_of(found, n)], NULL);
+        take(fit, &found[best], NULL);
         return GROOM_OK;
     }
+    wanted = (struct matching_wanted){.n_pairs = n_pairs, .floor = FLOOR_FINE};
     matching = NULL;
-    wanted.floor = FLOOR_FINE;
     st = matching_create(fit, &wanted, context, &matching, diag);
-    for (uint32_t k = 0; st == GROOM_OK && k < n; k++)
-        st = try_along(fit, matching, &found[k], &trial[k], context, diag);
+    if (st == GROOM_OK)
+        st = try_along(fit, matching, found, n, trial, &best, context, diag);
     matching_destroy(matching);
     if (st == GROOM_OK)
-        take(fit, &found[best_of(found, n)], &trial[best_of(found, n)]);
+        take(fit, &found[best], &trial[best]);
     return st;
 }
 
