@@ -23,11 +23,14 @@
 #define HAIRS (4 * AROUND)
 #define PI 3.14159265358979323846
 
-/* Of a misfit: what is more likely to begin with stays where others are not much better. */
-static const double prior[] = {[AXES_UNKNOWN] = 1, [AXES_GIVEN] = 0.72, [AXES_QUARTER] = 0.85, [AXES_NEAR] = 1};
+/* What is more likely to begin with stays where others are not much better: a misfit is taken by a factor, for what the model
+ * cannot say of the hair, and more by a number, for what chance does, which decides where few strands tell. */
+static const struct { double factor, more; } prior[] = {[AXES_UNKNOWN] = {1, 0}, [AXES_GIVEN] = {0.72, 0}, [AXES_QUARTER] = {0.85, 10}, [AXES_NEAR] = {1, 20}};
+
+static double weighed(double square, uint32_t axes) { return prior[axes].factor * square + prior[axes].more; }
 
 struct candidate {
-    double frame[3][3], square; /* of the misfit, by its prior */
+    double frame[3][3], square; /* of the misfit, weighed */
     uint32_t axes;
 };
 
@@ -120,7 +123,7 @@ static groom_status weigh(const struct groom_fit *fit, struct matching *matching
     for (uint32_t k = 0; st == GROOM_OK && k < n; k++) {
         memcpy(trial.frame, list[k].frame, sizeof trial.frame);
         st = trial_misfit(matching, &trial, &list[k].square, context, diag);
-        list[k].square *= prior[list[k].axes];
+        list[k].square = weighed(list[k].square, list[k].axes);
     }
     return st;
 }
@@ -138,12 +141,14 @@ static groom_status turn(const struct groom_fit *fit, struct matching *matching,
     struct trial trial;
     groom_status st = GROOM_OK;
     for (uint32_t k = 0; st == GROOM_OK && k < n; k++) {
+        double square = 0;
         trial_init(fit, 0, &trial);
         trial.n_unknowns = 0;
         trial_let_turn(&trial);
         memcpy(trial.frame, list[k].frame, sizeof trial.frame);
         for (int round = 0, ended = 0; st == GROOM_OK && !ended && round < ROUNDS; round++)
-            st = refine(matching, &trial, &list[k].square, &ended, context, diag);
+            st = refine(matching, &trial, &square, &ended, context, diag);
+        list[k].square = weighed(square, list[k].axes);
         frame_turned((const double (*)[3])trial.frame, trial.turn, list[k].frame);
     }
     return st;
@@ -210,7 +215,7 @@ static groom_status try_along(const struct groom_fit *fit, struct matching *matc
             if (ended[k] || found[k].square > farthest)
                 continue;
             st = refine(matching, &trial[k], &square, &ended[k], context, diag);
-            found[k].square = prior[found[k].axes] * square;
+            found[k].square = weighed(square, found[k].axes);
         }
     }
     *best = best_of(found, n);

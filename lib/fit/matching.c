@@ -15,7 +15,8 @@
 
 struct matching {
     const struct groom_allocator *allocator;
-    struct groom *groom;              /* of the sub-sample, with random numbers of its own */
+    struct groom *groom;              /* of the sub-sample, with random numbers of its own, along */
+    double frame[3][3];               /* the fit's */
     struct groom_strands *evaluated;  /* its strands, as they come */
     float (*points)[3];               /* the same resampled as the target was */
     float (*base)[3], (*guide)[3];
@@ -181,15 +182,39 @@ static groom_status allocate(struct matching *matching, const struct groom_conte
     return GROOM_OK;
 }
 
-/* Floats are finest near the middle of the hair. */
-static void centre_groom(struct groom *groom, const float centre[3])
+/* Into a frame about the middle of the hair, where floats are finest. */
+static void move(const double frame[3][3], const float centre[3], float (*points)[3], size_t n)
 {
-    for (size_t v = 0; v < guide_points(groom); v++)
+    for (size_t v = 0; v < n; v++) {
+        double d[3];
         for (int c = 0; c < 3; c++)
-            groom->guides[v][c] -= centre[c];
-    for (uint32_t i = 0; i < groom->n_strands; i++)
+            d[c] = (double)points[v][c] - (double)centre[c];
         for (int c = 0; c < 3; c++)
-            groom->roots[i][c] -= centre[c];
+            points[v][c] = (float)(frame[c][0] * d[0] + frame[c][1] * d[1] + frame[c][2] * d[2]);
+    }
+}
+
+/* The sample lies along the fit's frame, where operators mostly lean on nothing else, which is quickest. */
+static void move_groom(struct matching *matching, const struct groom_fit *fit)
+{
+    struct groom *groom = matching->groom;
+    memcpy(matching->frame, fit->frame, sizeof matching->frame);
+    memset(groom->axes, 0, sizeof groom->axes);
+    move(fit->frame, fit->centre, groom->guides, guide_points(groom));
+    move(fit->frame, fit->centre, groom->roots, groom->n_strands);
+}
+
+static void lean_on(struct matching *matching, const double axes[3][3])
+{
+    double back[3][3], along[3][3];
+    memset(matching->groom->axes, 0, sizeof matching->groom->axes);
+    if (memcmp(axes, matching->frame, sizeof matching->frame) == 0)
+        return;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            back[i][j] = matching->frame[j][i];
+    frame_multiply(axes, (const double (*)[3])back, along);
+    frame_store((const double (*)[3])along, matching->groom->axes);
 }
 
 static groom_status make_base(struct matching *matching, const struct groom_context *context, struct groom_diag *diag)
@@ -222,6 +247,7 @@ static void take_target(struct matching *matching, const struct groom_fit *fit, 
         for (uint32_t j = 0; j < m; j++)
             for (int c = 0; c < 3; c++)
                 matching->points[(size_t)i * m + j][c] = fit->target[(size_t)strand[i] * m + j][c] * fit->scale;
+    move(fit->frame, (const float[3]){0, 0, 0}, matching->points, points_of(matching));
 }
 
 static void measure_target(struct matching *matching, const struct groom_context *context)
@@ -292,8 +318,7 @@ groom_status matching_create(const struct groom_fit *fit, const struct matching_
     if ((st = choose_pairs(fit, n, strand, context, diag)) != GROOM_OK ||
         (st = groom_select(fit->groom, strand, 2 * n, context, &matching->groom, diag)) != GROOM_OK)
         goto out;
-    centre_groom(matching->groom, fit->centre);
-    frame_store((const double (*)[3])fit->frame, matching->groom->axes);
+    move_groom(matching, fit);
     if ((st = draw_numbers(matching->groom, wanted->known, allocator, diag)) != GROOM_OK ||
         (st = allocate(matching, context, diag)) != GROOM_OK ||
         (st = make_base(matching, context, diag)) != GROOM_OK)
@@ -332,7 +357,7 @@ groom_status matching_residual(struct matching *matching, const struct groom_ope
     struct groom *groom = matching->groom;
     for (uint32_t o = 0; o < groom->n_operators; o++)
         memcpy(groom->operators[o].parameter, operators[o].parameter, sizeof operators[o].parameter);
-    frame_store(axes, groom->axes);
+    lean_on(matching, axes);
     groom_status st = simulate(matching, context, diag);
     if (st != GROOM_OK)
         return st;

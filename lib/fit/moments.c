@@ -425,7 +425,7 @@ static void measure_pair(const struct measuring *job, const struct windows *wind
 static void measure_piece(void *user, uint32_t piece, uint32_t thread)
 {
     const struct measuring *job = user;
-    struct windows windows;
+    struct windows windows = {0};
     (void)thread;
     make_windows(job->plan->m, &windows);
     for (uint32_t i = piece * PAIRS_PER_PIECE; i < job->plan->n_pairs && i < (piece + 1) * PAIRS_PER_PIECE; i++)
