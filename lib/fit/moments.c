@@ -24,6 +24,9 @@
 #define DISTANCE_FLOOR 1e-8     /* of squared lengths */
 #define SHRINKAGE 0.1           /* of correlations */
 
+#define FEWEST_TELL 8           /* pairs; a statistic that fewer have is left out, */
+#define LEAST_SHARE 0.02        /* or of which fewer than this share: one pair does not scatter at all, which is no certainty */
+
 /* Times the floor, for statistics that lean on */
 #define BASE_FLOOR 5.0    /* base strands: what these do not share with their neighbours is smoothed away, and they are a few per
                            * cent too close; */
@@ -490,7 +493,7 @@ static void standardize(float *values, uint32_t n_pairs, const uint32_t *bundle,
         }
         for (uint32_t b = 0; b < n_bundles; b++)
             of_bundles += sums[b] * sums[b];
-        variance[f] = n > 0 ? fmax(of_bundles, square) / ((double)n * n) : 1e6;
+        variance[f] = n >= FEWEST_TELL && n >= LEAST_SHARE * n_pairs ? fmax(of_bundles, square) / ((double)n * n) : 1e6;
         float scale = square > 0 ? (float)(1 / sqrt(square)) : 0;
         for (uint32_t i = 0; i < n_pairs; i++)
             values[(size_t)i * MOMENTS_COUNT + f] *= scale;

@@ -88,7 +88,8 @@ void moments_mean(const float *values, uint32_t n_pairs, double mean[MOMENTS_COU
 /* The covariance of the means, of which bundles are the independent draws: per-pair correlations, shrunk, with variances of
  * sums over bundles and a floor, as its Cholesky factor. Of differences between two sets of strands of the same base
  * strands, what these scatter by cancels: it is the operators' random numbers that are left.
- * values      [n_pairs][MOMENTS_COUNT] or their differences; NANs become the mean, and all become deviations from it
+ * values      [n_pairs][MOMENTS_COUNT] or their differences; NANs become the mean, and all become deviations from it.
+ *             A statistic that few pairs have weighs nothing
  * bundle      [n_pairs] 0..n_bundles-1
  * size        [MOMENTS_COUNT] of the statistics themselves
  * floor       how finely the model is taken to tell a statistic, as a standard deviation: of logarithms and
