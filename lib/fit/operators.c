@@ -289,9 +289,10 @@ static groom_status refine_step(struct groom_fit *fit, struct matching *matching
     double square = 0;
     int converged = 0, moved = 0, last = fit->iteration + 1 >= fit->options.stages.operators.refinements;
     begin_trial(fit, &here);
-    groom_status st = trial_refine(matching, &here, 0, 1, CONVERGED, &square, &converged, context, diag);
+    uint32_t n_steps = floor_of(fit) <= FLOOR_LAST ? STEPS_AT_HAND : 1;
+    groom_status st = trial_refine(matching, &here, 0, n_steps, CONVERGED, &square, &converged, context, diag);
     if (st == GROOM_OK && converged && floor_of(fit) <= FLOOR_LAST) /* at the minimum, as one side has it */
-        st = trial_refine(matching, &here, 1, 1, CONVERGED, &square, &converged, context, diag);
+        st = trial_refine(matching, &here, 1, n_steps, CONVERGED, &square, &converged, context, diag);
     if (st != GROOM_OK)
         return st;
     trial_keep(&here, fit);
