@@ -18,6 +18,8 @@
 #define BEHIND 1.25      /* times the least misfit: who is farther off after the first */
 #define STEPS 2          /* and steps by each, */
 #define LEAST_GAIN 1e-2  /* which are to gain this share of the misfit */
+#define NOT_OF_THE_MODEL 2000 /* a misfit, where the model's own hair is less than 1 000 off even with rough parameters: such
+                          * hair was made along no axes, and what fits it a little better here is no better anywhere else */
 #define QUARTERS 24
 #define AROUND 8         /* turns about one of the hair's own axes */
 #define HAIRS (4 * AROUND)
@@ -232,6 +234,12 @@ static void take(struct groom_fit *fit, const struct candidate *best, const stru
         trial_keep(tried, fit);
 }
 
+static void take_given(struct groom_fit *fit)
+{
+    fit->axes = AXES_GIVEN;
+    frame_of(unit_of(0), unit_of(2), fit->frame);
+}
+
 groom_status axes_choose(struct groom_fit *fit, uint32_t n_pairs, const struct groom_context *context, struct groom_diag *diag)
 {
     struct candidate found[MOST_TRIED];
@@ -245,6 +253,10 @@ groom_status axes_choose(struct groom_fit *fit, uint32_t n_pairs, const struct g
     matching_destroy(matching);
     if (st != GROOM_OK)
         return st;
+    if (found[best_of(found, n)].square > NOT_OF_THE_MODEL) {
+        take_given(fit);
+        return GROOM_OK;
+    }
     n = leave_worthy(found, n);
     best = best_of(found, n);
     if (n == 1 || fit->axes == AXES_UNKNOWN) { /* the first time, parameters are rough */

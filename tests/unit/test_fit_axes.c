@@ -148,6 +148,23 @@ static void are_found_askew(groom_sample_style style, double most_degrees)
 START_TEST(axes_of_straight_hair_are_found_askew) { are_found_askew(GROOM_SAMPLE_STRAIGHT, 10); } END_TEST
 START_TEST(axes_of_bent_hair_are_found_askew) { are_found_askew(GROOM_SAMPLE_BENT, 15); } END_TEST
 
+/* Crimps from vertex to vertex, which no operator makes, on hair that was turned. */
+START_TEST(hair_that_is_not_of_the_model_lies_as_its_file_does)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_STRAIGHT, N, M, 4, NULL);
+    struct groom_fit_options options = known_options(sample, 0);
+    invariance_turn(sample, invariance_upright);
+    for (uint32_t v = 0; v < sample->capture->n_vertices; v++)
+        for (int c = 0; c < 3; c++)
+            sample->capture->points[v][c] += v % M == 0 ? 0 : v / 2 % 2 ? 2e-3f : -2e-3f;
+    struct groom_fit *fit = guides_fit(sample, &options, "randoms", NULL);
+    ck_assert_uint_eq(fit->axes, AXES_GIVEN);
+    is_frame(fit, invariance_as_it_is);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
 START_TEST(a_choice_that_fails_changes_nothing)
 {
     struct groom_sample *sample;
@@ -239,5 +256,5 @@ END_TEST
 TEST_SUITE("fit_axes", a_quarter_turn_about_z, a_rotation_leaves_its_axis_and_turns_by_its_length,
            axes_of_straight_hair_are_found_as_it_lies, axes_of_bent_hair_are_found_as_it_lies,
            waves_are_found_which_axis_was_up, axes_of_straight_hair_are_found_askew, axes_of_bent_hair_are_found_askew,
-           a_choice_that_fails_changes_nothing,
+           hair_that_is_not_of_the_model_lies_as_its_file_does, a_choice_that_fails_changes_nothing,
            operators_are_matched_along_the_axes_that_are_asked_for, a_groom_leans_on_the_axes_that_were_found)
