@@ -6,20 +6,20 @@
 #include "fit/frame.h"
 #include "fit/trial.h"
 
-#define FLOOR 0.03       /* of the statistics: coarse enough for parameters that were told along other axes */
-#define FLOOR_FINE 0.01  /* for those that go along with the axes */
+#define FLOOR 0.03        /* of the statistics: coarse enough for parameters that were told along other axes */
+#define FLOOR_FINE 0.01   /* for those that go along with the axes */
 #define WORTH_TURNING 2.5 /* times the least misfit: axes that may still be the best once they are turned, */
-#define WORTH_TRYING 1.6 /* or have parameters of their own */
-#define APART 0.5        /* radians between axes that are taken for others */
-#define MOST_TURNED 5    /* axes that are turned until they fit, the first time; */
-#define LATER_TURNED 3   /* later, when there are some already; */
-#define MOST_TRIED 4     /* and that are tried with parameters of their own, */
-#define ROUNDS 2         /* by so many slopes, */
-#define BEHIND 1.25      /* times the least misfit: who is farther off after the first */
-#define STEPS 2          /* and steps by each, */
-#define LEAST_GAIN 1e-2  /* which are to gain this share of the misfit */
+#define WORTH_TRYING 1.6  /* or have parameters of their own, */
+#define BEHIND 1.25       /* and those that go on being tried after the first steps */
+#define APART 0.5         /* radians between axes that are taken for others */
+#define MOST_TURNED 5     /* axes that are turned until they fit, the first time; */
+#define LATER_TURNED 3    /* later, when there are some already; */
+#define MOST_TRIED 4      /* and that are tried with parameters of their own, */
+#define ROUNDS 2          /* by so many slopes, */
+#define STEPS 2           /* and steps by each, */
+#define LEAST_GAIN 1e-2   /* which are to gain this share of the misfit */
 #define NOT_OF_THE_MODEL 2000 /* a misfit, where the model's own hair is less than 1 000 off even with rough parameters: such
-                          * hair was made along no axes, and what fits it a little better here is no better anywhere else */
+                           * hair was made along no axes, and what fits it a little better here is no better anywhere else */
 #define QUARTERS 24
 #define AROUND 8         /* turns about one of the hair's own axes */
 #define HAIRS (4 * AROUND)
@@ -27,7 +27,8 @@
 
 /* What is more likely to begin with stays where others are not much better: a misfit is taken by a factor, for what the model
  * cannot say of the hair, and more by a number, for what chance does, which decides where few strands tell. */
-static const struct { double factor, more; } prior[] = {[AXES_UNKNOWN] = {1, 0}, [AXES_GIVEN] = {0.72, 0}, [AXES_QUARTER] = {0.85, 10}, [AXES_NEAR] = {1, 20}};
+static const struct { double factor, more; } prior[] = {
+    [AXES_UNKNOWN] = {1, 0}, [AXES_GIVEN] = {0.72, 0}, [AXES_QUARTER] = {0.85, 10}, [AXES_NEAR] = {1, 20}};
 
 static double weighed(double square, uint32_t axes) { return prior[axes].factor * square + prior[axes].more; }
 

@@ -92,10 +92,11 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequ
                               const struct groom_context *context, struct groom_diag *diag)
 {
     struct matching *matching;
-    struct trial here;
+    struct trial here, before;
     double square;
     int ended = 0;
     trial_init(fit, frequencies_known, &here);
+    trial_init(fit, frequencies_known, &before);
     if (here.n_unknowns == 0 || fit->n < FEWEST_STRANDS)
         return GROOM_OK;
     if (fit->axes == AXES_NEAR)
@@ -110,6 +111,8 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequ
         if ((st = trial_refine(matching, &here, (int)last, STEPS_AT_HAND, CONVERGED_LAST, &square, &ended, context, diag)) == GROOM_OK)
             trial_keep(&here, fit);
     }
+    if (st != GROOM_OK)
+        trial_keep(&before, fit);
     axes_give(fit);
     matching_destroy(matching);
     return st;

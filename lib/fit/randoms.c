@@ -474,11 +474,28 @@ static groom_status lengths_step(struct groom_fit *fit, const struct pass *pass,
                           memory_allocator(context), diag);
 }
 
+/* Guides, then parameters for them: both, or neither. */
 static groom_status reshape_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
-    groom_status st = guides_refine(fit, context, diag);
-    if (st == GROOM_OK)
-        st = operators_refine(fit, fit->options.stages.randoms.refinements, frequencies_tell(fit->groom), context, diag);
+    const struct groom_allocator *allocator = memory_allocator(context);
+    struct groom *groom = fit->groom;
+    size_t n = (size_t)groom->n_guides * groom->n_vertices;
+    float (*guides)[3] = memory_array(allocator, n, sizeof *guides);
+    float (*uv)[2] = memory_array(allocator, groom->n_guides, sizeof *uv);
+    groom_status st = guides && uv ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to keep %u guides", groom->n_guides);
+    if (st == GROOM_OK) {
+        memcpy(guides, groom->guides, n * sizeof *guides);
+        memcpy(uv, groom->guide_uv, groom->n_guides * sizeof *uv);
+        st = guides_refine(fit, context, diag);
+        if (st == GROOM_OK)
+            st = operators_refine(fit, fit->options.stages.randoms.refinements, frequencies_tell(groom), context, diag);
+        if (st != GROOM_OK) {
+            memcpy(groom->guides, guides, n * sizeof *guides);
+            memcpy(groom->guide_uv, uv, groom->n_guides * sizeof *uv);
+        }
+    }
+    memory_release(allocator, guides, n, sizeof *guides);
+    memory_release(allocator, uv, groom->n_guides, sizeof *uv);
     return st;
 }
 

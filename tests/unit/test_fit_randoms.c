@@ -496,6 +496,46 @@ START_TEST(the_papers_steps_without_memory_change_nothing)
 }
 END_TEST
 
+/* --- cancelled ------------------------------------------------------------------------------ */
+
+static int after_a_while(void *user) { return (*(int *)user)-- <= 0; }
+
+/* Nowhere in a step, between guides and the parameters for them neither: what a worker keeps that is asked to end is what
+ * the next one goes on with. */
+START_TEST(a_cancelled_step_changes_nothing)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_WAVY, 300, M, 6, NULL);
+    struct groom_fit_options *options = malloc(sizeof *options);
+    int left, n_cancelled = 0;
+    struct groom_progress progress = {.cancelled = after_a_while, .user = &left};
+    struct groom_context context = {.progress = &progress};
+    groom_fit_options_init(GROOM_FIT_STANDARD, options);
+    options->vertices = M;
+    options->guides = 30;
+    struct groom_fit *fit = guides_fit(sample, options, "randoms", NULL);
+    for (int polls = 0; !groom_fit_done(fit); polls += 1 + polls / 4) {
+        struct fits_state before = fits_save(fit);
+        left = polls;
+        groom_status st = groom_fit_step(fit, &context, NULL);
+        ck_assert(st == GROOM_OK || st == GROOM_ECANCELLED);
+        if (st == GROOM_ECANCELLED) {
+            struct fits_state after = fits_save(fit);
+            ck_assert_uint_eq(before.n, after.n);
+            ck_assert_mem_eq(before.bytes, after.bytes, before.n);
+            free(after.bytes);
+            n_cancelled++;
+        } else {
+            polls = -1; /* the next step, from its first question on */
+        }
+        free(before.bytes);
+    }
+    ck_assert_int_gt(n_cancelled, 10);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+    free(options);
+}
+END_TEST
+
 TEST_SUITE("fit_randoms", the_error_is_none_on_the_same_curve_however_its_vertices_stand,
            the_error_does_not_jump_where_vertices_pass_corners,
            the_error_has_the_same_bits_in_all_variants, the_losses_are_those_of_their_equation,
@@ -503,6 +543,7 @@ TEST_SUITE("fit_randoms", the_error_is_none_on_the_same_curve_however_its_vertic
            guides_of_straight_hair_follow_known_numbers, guides_of_wavy_hair_follow_known_numbers,
            what_scales_have_in_common_goes_to_the_guides, frequencies_that_are_found_tell_their_law,
            what_halves_of_the_strands_do_not_agree_on_is_no_difference_of_curls, the_stage_has_the_same_bits_for_any_threads, the_stage_can_be_interrupted_anywhere,
+           a_cancelled_step_changes_nothing,
            a_step_without_memory_changes_nothing, no_rounds_leave_the_numbers_as_they_were_drawn, curls_of_a_few_strands_a_guide_take_another_round,
            the_papers_gradient_is_that_of_its_loss, the_papers_steps_go_down,
            the_papers_steps_can_be_interrupted_and_know_no_threads, the_papers_steps_without_memory_change_nothing)
