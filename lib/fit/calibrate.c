@@ -10,8 +10,8 @@
 #define STRANDS 4000    /* compared at most */
 #define FEWEST 32       /* whose mean says something */
 #define STEPS 3
-#define LARGEST 0.015   /* logarithm of the factor. Frizz is noise along fixed axes: hair that is turned needs up to a
-                         * twentieth more or less of it to turn as sharply, and its parameters are to stay within 3 % */
+#define LARGEST 0.015   /* logarithm of the factor. Where the axes that hair was made along are not found, up to a
+                         * twentieth more or less frizz turns as sharply, and parameters are to stay within 3 % */
 #define PROBE 0.02      /* first step, by which the slope is told */
 #define LEAST_SLOPE 0.2 /* of the logarithm of curvature: below, it is not of frizz */
 #define AMPLITUDE 1     /* of frizz's parameters */

@@ -135,7 +135,7 @@ static groom_status residual_of(struct matching *matching, const struct trial *t
 }
 
 groom_status trial_misfit(struct matching *matching, const struct trial *trial, double *square,
-                           const struct groom_context *context, struct groom_diag *diag)
+                          const struct groom_context *context, struct groom_diag *diag)
 {
     double residual[MOMENTS_COUNT] = {0};
     *square = INFINITY;

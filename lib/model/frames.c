@@ -24,24 +24,18 @@ static struct vec times(double s, struct vec a) { return (struct vec){s * a.x, s
 
 /* --- axes ------------------------------------------------------------------ */
 
+static struct vec axis_of(const float (*axes)[3], int i) { return (struct vec){axes[i][0], axes[i][1], axes[i][2]}; }
+
 /* A vector of space as it lies along the axes. */
 static struct vec along(const float (*axes)[3], struct vec v)
 {
-    if (!axes)
-        return v;
-    return (struct vec){axes[0][0] * v.x + axes[0][1] * v.y + axes[0][2] * v.z,
-                        axes[1][0] * v.x + axes[1][1] * v.y + axes[1][2] * v.z,
-                        axes[2][0] * v.x + axes[2][1] * v.y + axes[2][2] * v.z};
+    return axes ? (struct vec){dot(axis_of(axes, 0), v), dot(axis_of(axes, 1), v), dot(axis_of(axes, 2), v)} : v;
 }
 
 /* ... and back. */
 static struct vec in_space(const float (*axes)[3], struct vec v)
 {
-    if (!axes)
-        return v;
-    return (struct vec){axes[0][0] * v.x + axes[1][0] * v.y + axes[2][0] * v.z,
-                        axes[0][1] * v.x + axes[1][1] * v.y + axes[2][1] * v.z,
-                        axes[0][2] * v.x + axes[1][2] * v.y + axes[2][2] * v.z};
+    return axes ? plus(plus(times(v.x, axis_of(axes, 0)), times(v.y, axis_of(axes, 1))), times(v.z, axis_of(axes, 2))) : v;
 }
 
 static struct vec between(const float (*axes)[3], const float from[3], const float to[3])
