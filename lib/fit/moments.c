@@ -1,13 +1,12 @@
 #include "fit/moments.h"
 
-#include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/blas.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "fit/correlation.h"
 #include "fit/dense.h"
 #include "model/kernel.h"
 
@@ -459,6 +458,9 @@ void moments_mean(const float *values, uint32_t n_pairs, double mean[MOMENTS_COU
         mean[f] = n[f] > 0 ? mean[f] / n[f] : 0;
 }
 
+_Static_assert(MOMENTS_COUNT % CORRELATION_ROWS == 0 && MOMENTS_COUNT >= CORRELATION_COLUMNS && MOMENTS_COUNT <= CORRELATION_MOST,
+               "statistics are correlated some at a time");
+
 /* --- covariance ----------------------------------------------------------------------------------- */
 
 static int is_deviation(int f)
@@ -514,11 +516,9 @@ groom_status moments_covariance(float *values, uint32_t n_pairs, const uint32_t 
         st = groom_fail(diag, GROOM_ENOMEM, "no memory for the covariance of %d statistics", n);
         goto out;
     }
-    if ((st = blas_prepare(context, diag)) != GROOM_OK)
-        goto out;
     moments_mean(values, n_pairs, mean);
     standardize(values, n_pairs, bundle, n_bundles, mean, sums, variance);
-    cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, n, n, (int)n_pairs, 1, values, n, values, n, 0, correlation, n);
+    correlation_of(values, n_pairs, MOMENTS_COUNT, correlation, context);
     for (int f = 0; f < n; f++)
         for (int g = 0; g <= f; g++) {
             double *c = &cholesky[(size_t)f * (size_t)n + (size_t)g];

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "fit/correlation.h"
 #include "fit/moments.h"
 #include "groom/random.h"
 #include "tests/support/test.h"
@@ -90,4 +91,52 @@ START_TEST(what_few_pairs_tell_is_left_out)
 }
 END_TEST
 
-TEST_SUITE("fit_moments", means_scatter_as_their_pairs_do, what_few_pairs_tell_is_left_out)
+/* --- products of columns ------------------------------------------------------------------------ */
+
+static const float *rows_of_numbers(uint32_t n_rows, uint32_t n)
+{
+    float *values = malloc((size_t)n_rows * n * sizeof *values);
+    struct groom_random_key key = {3, 1};
+    for (uint32_t i = 0; i < n_rows; i++)
+        for (uint32_t f = 0; f < n; f++)
+            values[(size_t)i * n + f] = (float)groom_random_uniform(key, i, f) - 0.4f;
+    return values;
+}
+
+static double product(const float *values, uint32_t n_rows, uint32_t n, uint32_t f, uint32_t g)
+{
+    double sum = 0;
+    for (uint32_t i = 0; i < n_rows; i++)
+        sum += (double)values[(size_t)i * n + f] * values[(size_t)i * n + g];
+    return sum;
+}
+
+/* Whether the last tile lies upon a part of the one before or not, and whether rows fill their blocks or not; to the same bits by
+ * any instructions and threads. */
+START_TEST(columns_are_correlated)
+{
+    static const uint32_t columns[] = {16, 20, 32, 60, MOMENTS_COUNT, 256}, rows[] = {1, 63, 64, 700};
+    struct groom_pool *pool;
+    ck_ok(groom_pool_create(3, &pool));
+    struct groom_context three = {.pool = pool};
+    for (int c = 0; c < 6; c++)
+        for (int r = 0; r < 4; r++) {
+            uint32_t n = columns[c], n_rows = rows[r];
+            const float *values = rows_of_numbers(n_rows, n);
+            float *out = calloc((size_t)n * n, sizeof *out), *other = calloc((size_t)n * n, sizeof *out);
+            correlation_of(values, n_rows, n, out, NULL);
+            correlation_with(KERNEL_BASELINE, values, n_rows, n, other, &three);
+            for (uint32_t f = 0; f < n; f++)
+                for (uint32_t g = 0; g <= f; g++) {
+                    ck_assert(out[f * n + g] == other[f * n + g]);
+                    ck_assert_double_eq_tol(out[f * n + g], product(values, n_rows, n, f, g), 1e-6 * n_rows);
+                }
+            free(out);
+            free(other);
+            free((void *)(uintptr_t)values);
+        }
+    groom_pool_destroy(pool);
+}
+END_TEST
+
+TEST_SUITE("fit_moments", means_scatter_as_their_pairs_do, what_few_pairs_tell_is_left_out, columns_are_correlated)

@@ -234,7 +234,8 @@ GROOM_MUST_CHECK groom_status groom_fit_report_print(const struct groom_fit *fit
 GROOM_MUST_CHECK groom_status groom_fit_save(const struct groom_fit *fit, struct groom_sink sink,
                                              struct groom_diag *diag);
 /* Take up a saved state in a fit that was created from the same inputs and options; it then ends
- * with the same bits as the fit that was saved.
+ * with the same bits as the fit that was saved, on an x86-64 processor of another kind as well (by the methods of this
+ * library; the paper's multiply matrices by the BLAS of the machine, and losses that are only told do).
  * returns  GROOM_OK; GROOM_ECONFLICT (saved by other inputs, options or another version),
  *          GROOM_EFORMAT, GROOM_ETRUNCATED, GROOM_EIO, GROOM_ENOMEM: the fit stands as before */
 GROOM_MUST_CHECK groom_status groom_fit_load(struct groom_fit *fit, const struct groom_source *source,
