@@ -72,7 +72,14 @@ read -r passed failed skipped < <(awk '
     /^SKIPPED: /  { s++ }
     END { print p + 0, b + 0, s + 0 }' "$log")
 grep -h '^SKIPPED: ' "$log" | sort | uniq -c
+# What went wrong, once more and together: of a long log often its end alone is seen. Check's lines say "file:line:F:"; after
+# node's "not ok" comes a block with the error, whose text may begin on the next line.
 if [ ${#failed_programs[@]} -gt 0 ]; then
+    awk '/:[0-9]+:[FE]:/ { print; next }
+         /^ *not ok / { print; looks = 1; next }
+         looks && /^ *error:/ { print; taken = /[|>]-$/ ? 4 : 0; looks = 0; next }
+         taken > 0 { print; taken-- }
+         /^ *ok / { looks = taken = 0 }' "$log"
     echo "failed: ${failed_programs[*]}"
     [ "$failed" -gt 0 ] || failed=${#failed_programs[@]}
 fi
