@@ -10,6 +10,7 @@
 #include "base/progress.h"
 #include "fit/assign.h"
 #include "fit/bundles.h"
+#include "fit/coils.h"
 #include "fit/estimate.h"
 #include "fit/medoids.h"
 #include "fit/smooth.h"
@@ -29,17 +30,44 @@ enum phase { SEED, CLUSTER, GUIDES, OPERATOR_GUIDES, OPERATORS, BUNDLES, INSTANC
 #define FEW_STRANDS 16             /* so many may each be their own guide: they need not be alike */
 #define AS_NEAR 1.01f              /* squared distances that are the same but for rounding */
 #define GUIDES_PER_ROOT 4.0        /* guides for each square root of the number of strands */
+#define BUNDLE_GUIDES 2            /* guides an operator guide, where it has strands enough: a bundle that two share can be told, but not
+                                    * two bundles that share one, nor what any of their strands do; */
+#define BUNDLE_STRANDS 16          /* with fewer, */
+#define FEW_BUNDLE_GUIDES 4        /* so many guides: to stand in the middle of a bundle costs a guide what its own strands are like */
 
 static uint32_t least(uint32_t a, uint32_t b) { return a < b ? a : b; }
+static uint32_t most(uint32_t a, uint32_t b) { return a > b ? a : b; }
+static uint32_t share_of(uint32_t n, uint32_t parts) { return (n + parts - 1) / parts; }
 
 /* --- seeds -------------------------------------------------------------------- */
 
-static uint32_t automatic_guides(uint32_t n)
+/* Curls to have guides for, where there may be curls. */
+static groom_status count_coils(const struct groom_fit *fit, const struct groom_context *context, uint32_t *n_coils,
+                                struct groom_diag *diag)
+{
+    int winds = 0;
+    *n_coils = 0;
+    for (uint32_t i = 0; i < fit->options.n_operators; i++)
+        winds |= fit->options.operators[i] == GROOM_OPERATOR_CURL;
+    return winds ? coils_count(fit, context, n_coils, diag) : GROOM_OK;
+}
+
+static uint32_t automatic_guides(uint32_t n, uint32_t n_coils)
 {
     uint32_t guides = (uint32_t)(GUIDES_PER_ROOT * sqrt(n) + 0.5);
-    uint32_t most = least(n, FEW_STRANDS);
-    most = n / LEAST_CLUSTER > most ? n / LEAST_CLUSTER : most;
-    return least(guides, most);
+    return least(most(guides, n_coils), most(least(n, FEW_STRANDS), n / LEAST_CLUSTER));
+}
+
+static groom_status count_guides(const struct groom_fit *fit, const struct groom_context *context, uint32_t *wanted,
+                                 struct groom_diag *diag)
+{
+    uint32_t n_coils;
+    *wanted = least(fit->options.guides, fit->n);
+    if (fit->options.guides != GROOM_FIT_AUTO)
+        return GROOM_OK;
+    groom_status st = count_coils(fit, context, &n_coils, diag);
+    *wanted = automatic_guides(fit->n, n_coils);
+    return st;
 }
 
 /* q vertices of each of n strands of m, evenly. out [n][q] */
@@ -72,12 +100,13 @@ static groom_status keep_seeds(struct groom_fit *fit, const uint32_t *chosen, ui
 static groom_status seed_clusters(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
-    uint32_t asked = fit->options.guides, n_vertices = least(fit->m, FEATURE_VERTICES), n_chosen;
-    uint32_t wanted = least(asked == GROOM_FIT_AUTO ? automatic_guides(fit->n) : asked, fit->n);
+    uint32_t asked = fit->options.guides, n_vertices = least(fit->m, FEATURE_VERTICES), n_chosen, wanted;
+    groom_status st = count_guides(fit, context, &wanted, diag);
+    if (st != GROOM_OK)
+        return st;
     float (*features)[3] = memory_array(allocator, (size_t)fit->n * n_vertices, sizeof *features);
     uint32_t *chosen = memory_array(allocator, wanted, sizeof *chosen);
     struct groom_random_key key = {FIT_OWN_SEED, STREAM_CLUSTERS};
-    groom_status st;
 
     if (!features || !chosen) {
         st = groom_fail(diag, GROOM_ENOMEM, "no memory to seed %u clusters", wanted);
@@ -138,8 +167,8 @@ static groom_status iterate_on_features(struct groom_fit *fit, uint32_t q, struc
 /* Neighbouring vertices say much the same: where clusters are only on their way, some are enough. */
 static uint32_t vertices_of_iteration(const struct groom_fit *fit)
 {
-    uint32_t most = fit->options.stages.initialize.cluster_iterations, some = fit->m / CLUSTER_SHARE;
-    return fit->iteration + WHOLE_ITERATIONS < most && some >= FEATURE_VERTICES ? some : fit->m;
+    uint32_t limit = fit->options.stages.initialize.cluster_iterations, some = fit->m / CLUSTER_SHARE;
+    return fit->iteration + WHOLE_ITERATIONS < limit && some >= FEATURE_VERTICES ? some : fit->m;
 }
 
 static groom_status iterate(struct groom_fit *fit, uint32_t n_vertices, struct kmeans_step *step,
@@ -153,7 +182,7 @@ static groom_status iterate(struct groom_fit *fit, uint32_t n_vertices, struct k
 
 static groom_status cluster(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
-    uint32_t most = fit->options.stages.initialize.cluster_iterations;
+    uint32_t limit = fit->options.stages.initialize.cluster_iterations;
     struct kmeans_step step;
     for (double spent = 0, products = 0; spent == 0 || spent + products <= STEP_PRODUCTS; spent += products) {
         uint32_t n_vertices = vertices_of_iteration(fit);
@@ -165,8 +194,8 @@ static groom_status cluster(struct groom_fit *fit, const struct groom_context *c
         int settled = fit->iteration > 0 && step.n_changed == 0;
         fit->iteration++;
         if (settled && n_vertices < fit->m)
-            fit->iteration = most > WHOLE_ITERATIONS ? most - WHOLE_ITERATIONS : fit->iteration;
-        else if (fit->iteration >= most || settled) {
+            fit->iteration = limit > WHOLE_ITERATIONS ? limit - WHOLE_ITERATIONS : fit->iteration;
+        else if (fit->iteration >= limit || settled) {
             fit->phase = GUIDES;
             fit->iteration = 0;
             break;
@@ -215,15 +244,25 @@ static void place_guides(const struct groom_fit *fit, const uint32_t *strand_of,
     }
 }
 
-static struct groom_shape shape_of(const struct groom_fit *fit)
+static groom_status count_operator_guides(const struct groom_fit *fit, const struct groom_context *context, uint32_t *wanted,
+                                          struct groom_diag *diag)
 {
-    const struct groom_fit_options *options = &fit->options;
-    uint32_t quarter = (fit->n_guides + 3) / 4;
-    return (struct groom_shape){
-        .n_strands = fit->n, .n_vertices = fit->m, .n_guides = fit->n_guides,
-        .n_operator_guides = options->operator_guides == GROOM_FIT_AUTO ? quarter
-                                                                        : least(options->operator_guides, fit->n_guides),
-        .n_instancing = least(options->interpolation_guides, fit->n_guides)};
+    uint32_t n_coils, n_guides = fit->n_guides;
+    *wanted = least(fit->options.operator_guides, n_guides);
+    if (fit->options.operator_guides != GROOM_FIT_AUTO)
+        return GROOM_OK;
+    groom_status st = count_coils(fit, context, &n_coils, diag);
+    uint32_t for_strands = most(fit->n / BUNDLE_STRANDS, share_of(n_guides, FEW_BUNDLE_GUIDES));
+    *wanted = least(most(least(share_of(n_guides, BUNDLE_GUIDES), for_strands), n_coils), n_guides);
+    return st;
+}
+
+static groom_status choose_shape(const struct groom_fit *fit, const struct groom_context *context, struct groom_shape *shape,
+                                 struct groom_diag *diag)
+{
+    *shape = (struct groom_shape){.n_strands = fit->n, .n_vertices = fit->m, .n_guides = fit->n_guides,
+                                  .n_instancing = least(fit->options.interpolation_guides, fit->n_guides)};
+    return count_operator_guides(fit, context, &shape->n_operator_guides, diag);
 }
 
 static void note_shape(struct groom_fit *fit, const struct groom_shape *shape)
@@ -241,13 +280,15 @@ static void note_shape(struct groom_fit *fit, const struct groom_shape *shape)
 static groom_status make_guides(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
-    struct groom_shape shape = shape_of(fit);
+    struct groom_shape shape;
+    groom_status st = choose_shape(fit, context, &shape, diag);
+    if (st != GROOM_OK)
+        return st;
     struct groom_context own = {.allocator = fit->allocator}; /* the groom outlives the step's context */
     uint32_t *strand_of = memory_array(allocator, fit->n_guides, sizeof *strand_of);
     float *squared = memory_array(allocator, fit->n_guides, sizeof *squared);
     uint32_t n_fixed = (uint32_t)(fit->options.stages.initialize.fixed_fraction * fit->m);
     struct groom *groom = NULL;
-    groom_status st;
 
     if (!strand_of || !squared) {
         st = groom_fail(diag, GROOM_ENOMEM, "no memory for %u guides", fit->n_guides);
