@@ -70,24 +70,33 @@ static groom_status compute_frames(struct plan *plan, const uint32_t *strand, ui
     return GROOM_OK;
 }
 
-/* Guides relative to their roots: of these strands alone, too. */
+static void relate(struct plan *plan, uint32_t guide)
+{
+    uint32_t n = 3 * plan->groom->n_vertices;
+    const float *from = plan->groom->guides[(size_t)guide * plan->groom->n_vertices];
+    float *to = plan->relative + (size_t)guide * n;
+    for (uint32_t j = 0; j < n; j += 3)
+        for (uint32_t c = 0; c < 3; c++)
+            to[j + c] = from[j + c] - from[c];
+}
+
+/* Guides relative to their roots: of these strands alone, too; all of them where it is all strands, for these may be given
+ * guides that none had when the plan was made. */
 static groom_status make_relative(struct plan *plan, const uint32_t *strand, uint32_t first, uint32_t count)
 {
     const struct groom *groom = plan->groom;
     uint32_t n = 3 * groom->n_vertices, k = groom->n_instancing;
+    int all = !strand && count == groom->n_strands;
     uint8_t *made = memory_array_zero(plan->allocator, groom->n_guides, sizeof *made);
     plan->relative = memory_array(plan->allocator, (size_t)groom->n_guides * n, sizeof *plan->relative);
-    for (uint32_t i = 0; made && plan->relative && i < count; i++)
+    for (uint32_t g = 0; made && plan->relative && all && g < groom->n_guides; g++)
+        relate(plan, g);
+    for (uint32_t i = 0; made && plan->relative && !all && i < count; i++)
         for (uint32_t a = 0; a < k; a++) {
             uint32_t g = groom->instancing_guide[(size_t)(strand ? strand[i] : first + i) * k + a];
-            if (made[g])
-                continue;
+            if (!made[g])
+                relate(plan, g);
             made[g] = 1;
-            const float *from = groom->guides[(size_t)g * groom->n_vertices];
-            float *to = plan->relative + (size_t)g * n;
-            for (uint32_t j = 0; j < n; j += 3)
-                for (uint32_t c = 0; c < 3; c++)
-                    to[j + c] = from[j + c] - from[c];
         }
     memory_release(plan->allocator, made, groom->n_guides, sizeof *made);
     return made && plan->relative ? GROOM_OK : GROOM_ENOMEM;
