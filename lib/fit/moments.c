@@ -458,10 +458,10 @@ void moments_mean(const float *values, uint32_t n_pairs, double mean[MOMENTS_COU
         mean[f] = n[f] > 0 ? mean[f] / n[f] : 0;
 }
 
+/* --- covariance ----------------------------------------------------------------------------------- */
+
 _Static_assert(MOMENTS_COUNT % CORRELATION_ROWS == 0 && MOMENTS_COUNT >= CORRELATION_COLUMNS && MOMENTS_COUNT <= CORRELATION_MOST,
                "statistics are correlated some at a time");
-
-/* --- covariance ----------------------------------------------------------------------------------- */
 
 static int is_deviation(int f)
 {

@@ -80,8 +80,7 @@ static void relate(struct plan *plan, uint32_t guide)
             to[j + c] = from[j + c] - from[c];
 }
 
-/* Guides relative to their roots: of these strands alone, too; all of them where it is all strands, for these may be given
- * guides that none had when the plan was made. */
+/* Guides relative to their roots: of these strands alone, too, but where it is all strands. */
 static groom_status make_relative(struct plan *plan, const uint32_t *strand, uint32_t first, uint32_t count)
 {
     const struct groom *groom = plan->groom;

@@ -21,7 +21,9 @@ struct plan {
     const struct groom_allocator *allocator;
 };
 
-/* strand   [count], or NULL: the strands from `first` on
+/* A plan for all strands knows all guides, so that strands may be given others while it lasts; any plan knows those operator
+ * guides alone that its strands had when it was made.
+ * strand   [count], or NULL: the strands from `first` on
  * returns  GROOM_OK or GROOM_ENOMEM, with nothing to finish */
 GROOM_MUST_CHECK groom_status plan_init(struct plan *plan, const struct groom *groom, const uint32_t *strand,
                                         uint32_t first, uint32_t count, enum kernel_variant variant,

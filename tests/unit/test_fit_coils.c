@@ -108,28 +108,29 @@ START_TEST(without_memory_it_says_so)
 }
 END_TEST
 
-/* What a fit makes of it, where nobody says how many guides there are to be. */
+/* How many guides, and operator guides among them, a fit makes where nobody says. */
+static struct groom_shape automatic_counts(groom_sample_style style, uint32_t n_curls, uint32_t *n_coils)
+{
+    struct groom_sample *sample = sample_of(style, 3000, n_curls, 0);
+    struct groom_fit *fit = fit_of(sample, NULL);
+    ck_ok(coils_count(fit, NULL, n_coils, NULL));
+    while (!fit->groom)
+        ck_ok(groom_fit_step(fit, NULL, NULL));
+    struct groom_shape shape = {.n_guides = fit->groom->n_guides, .n_operator_guides = fit->groom->n_operator_guides};
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+    return shape;
+}
+
 START_TEST(automatic_counts_are_of_curls)
 {
-    struct groom_sample *sample = sample_of(GROOM_SAMPLE_COILY, 3000, 600, 0);
-    struct groom_fit *fit = fit_of(sample, NULL);
     uint32_t n_coils;
-    ck_ok(coils_count(fit, NULL, &n_coils, NULL));
-    while (!fit->groom)
-        ck_ok(groom_fit_step(fit, NULL, NULL));
-    ck_assert_uint_eq(fit->n_guides, n_coils < 3000 / 4 ? n_coils : 3000 / 4);
-    ck_assert_uint_eq(fit->groom->n_operator_guides, fit->n_guides);
-    groom_fit_destroy(fit);
-    groom_sample_destroy(sample);
-
-    sample = sample_of(GROOM_SAMPLE_STRAIGHT, 3000, 60, 0);
-    fit = fit_of(sample, NULL);
-    while (!fit->groom)
-        ck_ok(groom_fit_step(fit, NULL, NULL));
-    ck_assert_uint_eq(fit->n_guides, 219); /* four for each square root of the strands */
-    ck_assert_uint_eq(fit->groom->n_operator_guides, 110);
-    groom_fit_destroy(fit);
-    groom_sample_destroy(sample);
+    struct groom_shape shape = automatic_counts(GROOM_SAMPLE_COILY, 600, &n_coils);
+    ck_assert_uint_eq(shape.n_guides, n_coils < 3000 / 4 ? n_coils : 3000 / 4);
+    ck_assert_uint_eq(shape.n_operator_guides, shape.n_guides);
+    shape = automatic_counts(GROOM_SAMPLE_STRAIGHT, 60, &n_coils);
+    ck_assert_uint_eq(shape.n_guides, 219); /* four for each square root of the strands */
+    ck_assert_uint_eq(shape.n_operator_guides, 110);
 }
 END_TEST
 

@@ -10,10 +10,10 @@
 #include "groom/sample.h"
 #include "tests/support/test.h"
 
-/* What may be set before a process begins: kernels that every processor runs, and the C library's functions without some
- * instructions. */
+/* What may be set before a process begins: kernels that every processor runs, the C library's functions without some
+ * instructions, and memory that is full of something where it was 0. */
 static const char *const machines[] = {"GROOM_AS_IT_IS=1", "OPENBLAS_CORETYPE=Prescott", "OPENBLAS_CORETYPE=Barcelona",
-                                       "GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-AVX2,-AVX512F"};
+                                       "GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-AVX2,-AVX512F", "MALLOC_PERTURB_=90"};
 enum { MACHINES = sizeof machines / sizeof *machines };
 
 /* --- the process on the other machine ----------------------------------------------------------- */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "model/evaluate.h"
+#include "model/plan.h"
 #include "tests/support/grooms.h"
 #include "tests/support/reference.h"
 #include "tests/support/test.h"
@@ -223,6 +224,24 @@ START_TEST(any_range_gives_the_same_bits)
 }
 END_TEST
 
+/* Who looks for better guides of strands may come upon one that none of them had. */
+START_TEST(a_plan_for_all_strands_knows_guides_that_none_has)
+{
+    struct groom *groom = test_groom(middling, 5);
+    uint32_t m = groom->n_vertices, left = groom->n_guides - 1;
+    struct plan plan;
+    for (size_t a = 0; a < (size_t)groom->n_strands * groom->n_instancing; a++)
+        groom->instancing_guide[a] %= left;
+    ck_ok(plan_init(&plan, groom, NULL, 0, groom->n_strands, kernel_best_variant(), NULL));
+    const float (*x)[3] = (const float (*)[3])groom->guides + (size_t)left * m;
+    for (uint32_t j = 0; j < m; j++)
+        for (uint32_t c = 0; c < 3; c++)
+            ck_assert_float_eq(plan.relative[((size_t)left * m + j) * 3 + c], x[j][c] - x[0][c]);
+    plan_finish(&plan);
+    groom_destroy(groom);
+}
+END_TEST
+
 START_TEST(any_pool_and_any_instruction_set_give_the_same_bits)
 {
     struct groom *groom = test_groom(middling, 5);
@@ -267,5 +286,5 @@ TEST_SUITE("model_evaluate", each_operator_follows_its_formula, frizz_follows_it
            chains_of_any_order_and_length_follow_the_formulas, operators_lean_on_the_grooms_axes, fast_frizz_leans_on_the_grooms_axes, axes_of_space_change_no_bit,
            a_disabled_operator_does_nothing,
            degenerate_guides_follow_the_formulas_and_stay_finite, extreme_parameters_stay_finite,
-           any_range_gives_the_same_bits, any_pool_and_any_instruction_set_give_the_same_bits,
+           any_range_gives_the_same_bits, a_plan_for_all_strands_knows_guides_that_none_has, any_pool_and_any_instruction_set_give_the_same_bits,
            evaluation_survives_every_failed_allocation)
