@@ -186,32 +186,41 @@ static void find_likeliest(struct siting *s)
 
 /* --- back onto the head --------------------------------------------------------------------------- */
 
-/* How places go with coordinates among the strands of a site: sums, then a linear map. */
-struct map { double place[3], square[3], mixed[3][2]; };
+/* How places go with coordinates among the strands of a site: means, sums of what is off these, then a linear map. (Sums of
+ * places as they are would round away what a few strands, nearly on a line, tell of what is off it.) */
+struct map { double n, middle[2], place[3], square[3], mixed[3][2]; };
 
-static void add_to_map(struct map *map, const struct siting *s, uint32_t i, uint32_t o)
+static void add_to_means(struct map *map, const struct siting *s, uint32_t i)
 {
-    double u = (double)s->fit->root_uv[i][0] - (double)s->middle[o][0], v = (double)s->fit->root_uv[i][1] - (double)s->middle[o][1];
+    map->n++;
+    for (int c = 0; c < 2; c++)
+        map->middle[c] += ((double)s->fit->root_uv[i][c] - map->middle[c]) / map->n;
+    for (int c = 0; c < 3; c++)
+        map->place[c] += ((double)s->fit->roots[i][c] - map->place[c]) / map->n;
+}
+
+static void add_to_map(struct map *map, const struct siting *s, uint32_t i)
+{
+    double u = (double)s->fit->root_uv[i][0] - map->middle[0], v = (double)s->fit->root_uv[i][1] - map->middle[1];
     map->square[0] += u * u;
     map->square[1] += u * v;
     map->square[2] += v * v;
     for (int c = 0; c < 3; c++) {
-        double x = (double)s->fit->roots[i][c];
-        map->place[c] += x;
+        double x = (double)s->fit->roots[i][c] - map->place[c];
         map->mixed[c][0] += u * x;
         map->mixed[c][1] += v * x;
     }
 }
 
-/* The place of coordinates (u, v) off the middle; strands that lie on a line tell nothing of what is off it. */
-static void place_of(const struct map *map, double n, double least, const double off[2], double place[3])
+/* The place of coordinates; strands that lie on a line tell nothing of what is off it. */
+static void place_of(const struct map *map, double least, const double at[2], double place[3])
 {
-    double uu = map->square[0] + n * least, uv = map->square[1], vv = map->square[2] + n * least;
+    double uu = map->square[0] + map->n * least, uv = map->square[1], vv = map->square[2] + map->n * least;
     double determinant = uu * vv - uv * uv, inverse = determinant > 0 ? 1 / determinant : 0;
     for (int c = 0; c < 3; c++) {
         double along_u = inverse * (vv * map->mixed[c][0] - uv * map->mixed[c][1]);
         double along_v = inverse * (uu * map->mixed[c][1] - uv * map->mixed[c][0]);
-        place[c] = map->place[c] / n + along_u * off[0] + along_v * off[1];
+        place[c] = map->place[c] + along_u * (at[0] - map->middle[0]) + along_v * (at[1] - map->middle[1]);
     }
 }
 
@@ -220,14 +229,15 @@ static void place_sites(const struct siting *s, struct map *map, struct site *si
     double least = LEAST_SPREAD * s->spacing * s->spacing;
     memset(map, 0, s->n_sites * sizeof *map);
     for (uint32_t i = 0; i < s->fit->n; i++)
-        add_to_map(&map[s->follows[i]], s, i, s->follows[i]);
+        add_to_means(&map[s->follows[i]], s, i);
+    for (uint32_t i = 0; i < s->fit->n; i++)
+        add_to_map(&map[s->follows[i]], s, i);
     for (uint32_t o = 0; o < s->n_sites; o++) {
-        const double off[2] = {s->at[o][0] - (double)s->middle[o][0], s->at[o][1] - (double)s->middle[o][1]};
         struct groom_surface_point surface;
         site[o] = (struct site){.n = s->count[o]};
         if (s->count[o] == 0)
             continue;
-        place_of(&map[o], s->count[o], least, off, site[o].at);
+        place_of(&map[o], least, s->at[o], site[o].at);
         const float near[3] = {(float)site[o].at[0], (float)site[o].at[1], (float)site[o].at[2]};
         if (s->fit->bvh && groom_bvh_closest(s->fit->bvh, near, INFINITY, &surface))
             for (int c = 0; c < 3; c++)

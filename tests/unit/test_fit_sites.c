@@ -114,5 +114,31 @@ START_TEST(one_place_is_the_place)
 }
 END_TEST
 
-TEST_SUITE("fit_sites", sites_are_nearer_than_middles, partings_bend_no_borders, odd_followings_have_places,
+/* Few strands a site, some nearly on a line: roots that are off by rounding move no place by more than a part of a millimetre. */
+START_TEST(rounding_moves_no_place)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_COILY, 1500, VERTICES, 1, NULL);
+    struct groom_fit *fit = fit_of(sample);
+    const struct groom *truth = sample->truth;
+    uint32_t n = truth->n_operator_guides;
+    struct site *site = calloc(n, sizeof *site), *other = calloc(n, sizeof *other);
+    ck_ok(sites_find(fit, truth->operator_guide_of, n, site, NULL, NULL));
+    for (uint32_t i = 0; i < fit->n; i++)
+        for (int c = 0; c < 3; c++)
+            fit->roots[i][c] = nextafterf(fit->roots[i][c], (i + (uint32_t)c) % 2 ? 10.0f : -10.0f);
+    for (uint32_t i = 0; i < fit->n; i++)
+        for (int c = 0; c < 2; c++)
+            fit->root_uv[i][c] = nextafterf(fit->root_uv[i][c], (i / 2 + (uint32_t)c) % 2 ? 10.0f : -10.0f);
+    ck_ok(sites_find(fit, truth->operator_guide_of, n, other, NULL, NULL));
+    for (uint32_t o = 0; o < n; o++) {
+        const float at[3] = {(float)other[o].at[0], (float)other[o].at[1], (float)other[o].at[2]};
+        ck_assert_double_lt(apart(site[o].at, at), 1e-5);
+    }
+    free(site), free(other);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+END_TEST
+
+TEST_SUITE("fit_sites", rounding_moves_no_place, sites_are_nearer_than_middles, partings_bend_no_borders, odd_followings_have_places,
            one_place_is_the_place)
