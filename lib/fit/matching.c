@@ -23,6 +23,8 @@ struct matching {
     float *values;                    /* [n_pairs][MOMENTS_COUNT] */
     double *cholesky;                 /* of the statistics' covariance */
     double target[MOMENTS_COUNT];
+    double other_draws[MOMENTS_COUNT]; /* how far their mean is from what is simulated */
+    int known;                         /* of matching_wanted */
     struct moments_plan plan;
 };
 
@@ -142,7 +144,8 @@ static groom_status stratify(float *u, uint32_t n, int uniform, const struct gro
  * of their kind. Numbers that single strands were found to have hold what guides are wrong by, and are drawn. */
 static int keeps_numbers(const struct groom_operator *op, int known) { return known && op->type == GROOM_OPERATOR_CURL; }
 
-static groom_status draw_numbers(struct groom *groom, int known, const struct groom_allocator *allocator, struct groom_diag *diag)
+static groom_status draw_numbers(struct groom *groom, int known, uint64_t draw, const struct groom_allocator *allocator,
+                                 struct groom_diag *diag)
 {
     for (uint32_t o = 0; o < groom->n_operators; o++) {
         struct groom_operator *op = &groom->operators[o];
@@ -150,7 +153,7 @@ static groom_status draw_numbers(struct groom *groom, int known, const struct gr
         const struct groom_operator_random *randoms = groom_operator_randoms(op->type, &n_randoms);
         if (keeps_numbers(op, known))
             continue;
-        groom_draw_random(groom, op, FIT_OWN_SEED);
+        groom_draw_random(groom, op, FIT_OWN_SEED + draw);
         for (uint32_t r = 0; r < n_randoms; r++)
             if (stratify(op->random[r], n, randoms[r].minimum == 0, allocator) != GROOM_OK)
                 return groom_fail(diag, GROOM_ENOMEM, "no memory for random numbers");
@@ -310,6 +313,7 @@ groom_status matching_create(const struct groom_fit *fit, const struct matching_
     groom_status st = matching && strand ? GROOM_OK : groom_fail(diag, GROOM_ENOMEM, "no memory to match operators");
     if (matching) {
         matching->allocator = allocator;
+        matching->known = wanted->known;
         matching->plan.n_pairs = n;
         matching->plan.m = fit->m;
     }
@@ -319,7 +323,7 @@ groom_status matching_create(const struct groom_fit *fit, const struct matching_
         (st = groom_select(fit->groom, strand, 2 * n, context, &matching->groom, diag)) != GROOM_OK)
         goto out;
     move_groom(matching, fit);
-    if ((st = draw_numbers(matching->groom, wanted->known, allocator, diag)) != GROOM_OK ||
+    if ((st = draw_numbers(matching->groom, wanted->known, 0, allocator, diag)) != GROOM_OK ||
         (st = allocate(matching, context, diag)) != GROOM_OK ||
         (st = make_base(matching, context, diag)) != GROOM_OK)
         goto out;
@@ -351,19 +355,52 @@ void matching_destroy(struct matching *matching)
     memory_release(allocator, matching, 1, sizeof *matching);
 }
 
+static void set_operators(struct matching *matching, const struct groom_operator *operators, const double axes[3][3])
+{
+    for (uint32_t o = 0; o < matching->groom->n_operators; o++)
+        memcpy(matching->groom->operators[o].parameter, operators[o].parameter, sizeof operators[o].parameter);
+    lean_on(matching, axes);
+}
+
+/* The mean statistics of one draw of random numbers, which stays. */
+static groom_status simulate_draw(struct matching *matching, uint32_t draw, double mean[MOMENTS_COUNT],
+                                  const struct groom_context *context, struct groom_diag *diag)
+{
+    groom_status st = draw_numbers(matching->groom, matching->known, draw, matching->allocator, diag);
+    if (st == GROOM_OK)
+        st = simulate(matching, context, diag);
+    if (st == GROOM_OK)
+        moments_mean(matching->values, matching->plan.n_pairs, mean);
+    return st;
+}
+
+groom_status matching_average(struct matching *matching, const struct groom_operator *operators, const double axes[3][3],
+                              uint32_t n_draws, const struct groom_context *context, struct groom_diag *diag)
+{
+    double sum[MOMENTS_COUNT] = {0}, mean[MOMENTS_COUNT];
+    set_operators(matching, operators, axes);
+    for (uint32_t draw = n_draws; draw-- > 0;) { /* ends with the first, which is left to be simulated */
+        groom_status st = simulate_draw(matching, draw, mean, context, diag);
+        if (st != GROOM_OK)
+            return st;
+        for (int f = 0; f < MOMENTS_COUNT; f++)
+            sum[f] += mean[f];
+    }
+    for (int f = 0; f < MOMENTS_COUNT; f++)
+        matching->other_draws[f] = sum[f] / n_draws - mean[f];
+    return GROOM_OK;
+}
+
 groom_status matching_residual(struct matching *matching, const struct groom_operator *operators, const double axes[3][3],
                                double residual[MOMENTS_COUNT], const struct groom_context *context, struct groom_diag *diag)
 {
-    struct groom *groom = matching->groom;
-    for (uint32_t o = 0; o < groom->n_operators; o++)
-        memcpy(groom->operators[o].parameter, operators[o].parameter, sizeof operators[o].parameter);
-    lean_on(matching, axes);
+    set_operators(matching, operators, axes);
     groom_status st = simulate(matching, context, diag);
     if (st != GROOM_OK)
         return st;
     moments_mean(matching->values, matching->plan.n_pairs, residual);
     for (int f = 0; f < MOMENTS_COUNT; f++)
-        residual[f] -= matching->target[f];
+        residual[f] += matching->other_draws[f] - matching->target[f];
     dense_forward(matching->cholesky, MOMENTS_COUNT, residual);
     return GROOM_OK;
 }

@@ -25,6 +25,14 @@ GROOM_MUST_CHECK groom_status matching_create(const struct groom_fit *fit, const
                                               struct groom_diag *diag);
 void matching_destroy(struct matching *matching); /* takes NULL */
 
+/* Statistics of one draw scatter as much as the target's own do. From now on residuals are of the mean of n_draws: of the draw
+ * that is simulated, moved by how far it is from that mean at these operators, which changes little with them. n_draws > 0
+ * returns    GROOM_OK, GROOM_ENOMEM: the matching is of no use then
+ * threads    same bits for any pool */
+GROOM_MUST_CHECK groom_status matching_average(struct matching *matching, const struct groom_operator *operators,
+                                               const double axes[3][3], uint32_t n_draws, const struct groom_context *context,
+                                               struct groom_diag *diag);
+
 /* How far the statistics of the groom with these operators are from the target's, as independent numbers
  * of variance 1 where the operators are right (with guides that are right, too).
  * operators  of the fit's groom, of which the parameters are read

@@ -43,6 +43,7 @@ enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 #define LAST_LOOK 4            /* steps before the last, in which they are chosen again */
 #define CONVERGED 1e-3       /* share of the misfit that a step must gain, while guides are rough; */
 #define CONVERGED_LAST 1e-5  /* when they are known: valleys are flat, and what stops on their sides remembers its way */
+#define DRAWS 8 /* of random numbers, whose mean is matched once statistics are fine: one scatters as much as the target does */
 #define STEPS_AT_HAND 4      /* by the same slopes, near the minimum */
 
 /* --- parameters --------------------------------------------------------------------------- */
@@ -106,6 +107,7 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequ
     groom_status st = matching_create(fit, &wanted, context, &matching, diag);
     if (st != GROOM_OK)
         return st;
+    st = trial_average(matching, &here, DRAWS, context, diag);
     for (uint32_t k = 0, last = 0; st == GROOM_OK && !last && k < n_steps; k++) {
         last = ended || k + 1 == n_steps;
         if ((st = trial_refine(matching, &here, (int)last, STEPS_AT_HAND, CONVERGED_LAST, &square, &ended, context, diag)) == GROOM_OK)
@@ -285,6 +287,15 @@ static groom_status axes_step(struct groom_fit *fit, const struct groom_context 
     return choose_axes(fit, &moved, context, diag);
 }
 
+/* From the minimum of one draw, as one side's slopes have it, to that of their mean, which is near. */
+static groom_status settle(struct matching *matching, struct trial *here, double *square, const struct groom_context *context,
+                           struct groom_diag *diag)
+{
+    int ended;
+    groom_status st = trial_average(matching, here, DRAWS, context, diag);
+    return st == GROOM_OK ? trial_refine(matching, here, 1, STEPS_AT_HAND, CONVERGED, square, &ended, context, diag) : st;
+}
+
 static groom_status refine_step(struct groom_fit *fit, struct matching *matching, const struct groom_context *context,
                                 struct groom_diag *diag)
 {
@@ -294,12 +305,13 @@ static groom_status refine_step(struct groom_fit *fit, struct matching *matching
     begin_trial(fit, &here);
     uint32_t n_steps = floor_of(fit) <= FLOOR_LAST ? STEPS_AT_HAND : 1;
     groom_status st = trial_refine(matching, &here, 0, n_steps, CONVERGED, &square, &converged, context, diag);
-    if (st == GROOM_OK && converged && floor_of(fit) <= FLOOR_LAST) /* at the minimum, as one side has it */
-        st = trial_refine(matching, &here, 1, n_steps, CONVERGED, &square, &converged, context, diag);
+    converged &= floor_of(fit) <= FLOOR_LAST;
+    if (st == GROOM_OK && (converged || last))
+        st = settle(matching, &here, &square, context, diag);
     if (st != GROOM_OK)
         return st;
     trial_keep(&here, fit);
-    converged &= fit->axes != AXES_UNKNOWN && floor_of(fit) <= FLOOR_LAST;
+    converged &= fit->axes != AXES_UNKNOWN;
     if (converged && !last && fit->axes_looks < 2 && (st = choose_axes(fit, &moved, context, diag)) != GROOM_OK)
         return st;
     report_progress(&fit->report, "operators", "misfit", square, count_unknowns(fit) + fit->iteration, context);

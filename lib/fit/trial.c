@@ -134,6 +134,16 @@ static groom_status residual_of(struct matching *matching, const struct trial *t
     return matching_residual(matching, trial->operators, (const double (*)[3])axes, residual, context, diag);
 }
 
+groom_status trial_average(struct matching *matching, const struct trial *trial, uint32_t n_draws,
+                           const struct groom_context *context, struct groom_diag *diag)
+{
+    double axes[3][3];
+    if (progress_cancelled(context))
+        return groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage operators");
+    frame_turned((const double (*)[3])trial->frame, trial->turn, axes);
+    return matching_average(matching, trial->operators, (const double (*)[3])axes, n_draws, context, diag);
+}
+
 groom_status trial_misfit(struct matching *matching, const struct trial *trial, double *square,
                           const struct groom_context *context, struct groom_diag *diag)
 {
