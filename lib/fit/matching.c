@@ -377,7 +377,7 @@ static groom_status simulate_draw(struct matching *matching, uint32_t draw, doub
 groom_status matching_average(struct matching *matching, const struct groom_operator *operators, const double axes[3][3],
                               uint32_t n_draws, const struct groom_context *context, struct groom_diag *diag)
 {
-    double sum[MOMENTS_COUNT] = {0}, mean[MOMENTS_COUNT];
+    double sum[MOMENTS_COUNT] = {0}, mean[MOMENTS_COUNT] = {0};
     set_operators(matching, operators, axes);
     for (uint32_t draw = n_draws; draw-- > 0;) { /* ends with the first, which is left to be simulated */
         groom_status st = simulate_draw(matching, draw, mean, context, diag);

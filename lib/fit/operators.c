@@ -44,6 +44,7 @@ enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 #define CONVERGED 1e-3       /* share of the misfit that a step must gain, while guides are rough; */
 #define CONVERGED_LAST 1e-5  /* when they are known: valleys are flat, and what stops on their sides remembers its way */
 #define DRAWS 8 /* of random numbers, whose mean is matched once statistics are fine: one scatters as much as the target does */
+#define SETTLING 3   /* slopes there at most */
 #define STEPS_AT_HAND 4      /* by the same slopes, near the minimum */
 
 /* --- parameters --------------------------------------------------------------------------- */
@@ -291,9 +292,11 @@ static groom_status axes_step(struct groom_fit *fit, const struct groom_context 
 static groom_status settle(struct matching *matching, struct trial *here, double *square, const struct groom_context *context,
                            struct groom_diag *diag)
 {
-    int ended;
+    int ended = 0;
     groom_status st = trial_average(matching, here, DRAWS, context, diag);
-    return st == GROOM_OK ? trial_refine(matching, here, 1, STEPS_AT_HAND, CONVERGED, square, &ended, context, diag) : st;
+    for (int k = 0; st == GROOM_OK && !ended && k < SETTLING; k++)
+        st = trial_refine(matching, here, 1, STEPS_AT_HAND, CONVERGED, square, &ended, context, diag);
+    return st;
 }
 
 static groom_status refine_step(struct groom_fit *fit, struct matching *matching, const struct groom_context *context,
