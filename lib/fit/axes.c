@@ -12,10 +12,12 @@
 #define WORTH_TRYING 1.6  /* or have parameters of their own, */
 #define BEHIND 1.25       /* and those that go on being tried after the first steps */
 #define APART 0.5         /* radians between axes that are taken for others */
-#define MOST_TURNED 5     /* axes that are turned until they fit, the first time; */
-#define LATER_TURNED 3    /* later, when there are some already; */
-#define MOST_TRIED 4      /* and that are tried with parameters of their own, */
-#define ROUNDS 2          /* by so many slopes, */
+#define MOST_TURNED 12    /* axes that are turned until they fit, */
+#define MOST_TRIED 8      /* and that are tried with parameters of their own; */
+#define FEW_TURNED 3      /* the same where the file's axes are as good as any so far: */
+#define FEW_TRIED 3       /* others are to be better by far */
+#define ROUNDS 2          /* by so many slopes; */
+#define ROUNDS_ALONG 6    /* where parameters go along: of axes that are much alike, valleys are told apart near their ground; */
 #define STEPS 2           /* and steps by each, */
 #define LEAST_GAIN 1e-2   /* which are to gain this share of the misfit */
 #define NOT_OF_THE_MODEL 2000 /* a misfit, where the model's own hair is less than 1 000 off even with rough parameters: such
@@ -28,7 +30,8 @@
 /* What is more likely to begin with stays where others are not much better: a misfit is taken by a factor, for what the model
  * cannot say of the hair, and more by a number, for what chance does, which decides where few strands tell. */
 static const struct { double factor, more; } prior[] = {
-    [AXES_UNKNOWN] = {1, 0}, [AXES_GIVEN] = {0.72, 0}, [AXES_QUARTER] = {0.85, 10}, [AXES_NEAR] = {1, 20}};
+    [AXES_UNKNOWN] = {1, 0}, [AXES_GIVEN] = {0.72, 0}, [AXES_QUARTER] = {0.93, 10}, [AXES_NEAR] = {1, 22},
+             [AXES_FOUND] = {1, 22}};
 
 static double weighed(double square, uint32_t axes) { return prior[axes].factor * square + prior[axes].more; }
 
@@ -179,9 +182,11 @@ static groom_status look_around(const struct groom_fit *fit, struct matching *ma
         found[n++] = now;
     n = add_best(found, n, n + 1, quarter, QUARTERS, INFINITY);
     double farthest = WORTH_TURNING * found[best_of(found, n)].square;
-    n_turned = add_best(turned, 0, fit->axes == AXES_UNKNOWN ? MOST_TURNED : LATER_TURNED, hair, HAIRS, farthest);
+    const struct candidate *best = &found[best_of(found, n)];
+    int given = best->axes == AXES_GIVEN && best->square <= hair[best_of(hair, HAIRS)].square;
+    n_turned = add_best(turned, 0, given ? FEW_TURNED : MOST_TURNED, hair, HAIRS, farthest);
     if ((st = turn(fit, matching, turned, n_turned, context, diag)) == GROOM_OK)
-        *n_found = add_best(found, n, MOST_TRIED, turned, n_turned, INFINITY);
+        *n_found = add_best(found, n, given ? FEW_TRIED : MOST_TRIED, turned, n_turned, INFINITY);
     return st;
 }
 
@@ -211,7 +216,7 @@ static groom_status try_along(const struct groom_fit *fit, struct matching *matc
         memcpy(trial[k].frame, found[k].frame, sizeof trial[k].frame);
         found[k].square = 0;
     }
-    for (int round = 0; round < ROUNDS; round++) {
+    for (int round = 0; round < ROUNDS_ALONG; round++) {
         double farthest = BEHIND * found[best_of(found, n)].square;
         for (uint32_t k = 0; st == GROOM_OK && k < n; k++) {
             double square = 0;
@@ -241,6 +246,12 @@ static void take_given(struct groom_fit *fit)
     frame_of(unit_of(0), unit_of(2), fit->frame);
 }
 
+/* Few pairs tell when the file's axes are as good as any; which of others are needs all of them. */
+static uint32_t pairs_for(const struct groom_fit *fit, uint32_t n_pairs, const struct candidate *likeliest)
+{
+    return likeliest->axes == AXES_GIVEN ? n_pairs : fit->options.stages.operators.pairs;
+}
+
 groom_status axes_choose(struct groom_fit *fit, uint32_t n_pairs, const struct groom_context *context, struct groom_diag *diag)
 {
     struct candidate found[MOST_TRIED];
@@ -264,7 +275,7 @@ groom_status axes_choose(struct groom_fit *fit, uint32_t n_pairs, const struct g
         take(fit, &found[best], NULL);
         return GROOM_OK;
     }
-    wanted = (struct matching_wanted){.n_pairs = n_pairs, .floor = FLOOR_FINE};
+    wanted = (struct matching_wanted){.n_pairs = pairs_for(fit, n_pairs, &found[best]), .floor = FLOOR_FINE};
     matching = NULL;
     st = matching_create(fit, &wanted, context, &matching, diag);
     if (st == GROOM_OK)

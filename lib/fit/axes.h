@@ -15,7 +15,7 @@
  * about as good as any; these by quarter turns, where another axis was up; or others, near those that the hair itself tells
  * (canonical.h). The first time parameters are rough, and are left as they are; later, what may be best is tried with
  * parameters that go along, which it takes with it where the axes change: told along other axes, parameters speak for those.
- * n_pairs  that tell
+ * n_pairs  that tell whether the file's do; which of others do, all pairs of stage `operators` tell
  * returns  GROOM_OK, GROOM_ENOMEM, GROOM_ECANCELLED; the fit is untouched on error */
 GROOM_MUST_CHECK groom_status axes_choose(struct groom_fit *fit, uint32_t n_pairs, const struct groom_context *context,
                                           struct groom_diag *diag);

@@ -260,7 +260,7 @@ static int sound_report(const struct groom_fit_report *report)
 
 static int sound_axes(const struct groom_fit *fit)
 {
-    int sound = fit->axes <= AXES_NEAR && fit->axes_looks <= 2;
+    int sound = fit->axes <= AXES_FOUND && fit->axes_looks <= 2;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             sound &= fabs(fit->frame[i][j]) <= 1.001;

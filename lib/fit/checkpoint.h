@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 
-#define CHECKPOINT_VERSION 10
+#define CHECKPOINT_VERSION 11
 
 struct checkpoint_header {
     char magic[8];          /* "GROOMFIT" */

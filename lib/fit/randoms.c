@@ -20,6 +20,7 @@
 
 #include "base/memory.h"
 #include "base/progress.h"
+#include "fit/align.h"
 #include "fit/calibrate.h"
 #include "fit/follow.h"
 #include "fit/frequencies.h"
@@ -56,11 +57,11 @@
 
 /* What is looked for: which operator guide each strand follows, the numbers of strands in one operator, both at once of
  * strands that are far off, the numbers of operator guides, what the strands of these are long, the law that these
- * follow, the last digits of all that a strand has, which bundles are two, what numbers tell of how long guides are, the
+ * follow, the axes that all lean on, the last digits of all that a strand has, which bundles are two, what numbers tell of how long guides are, the
  * guides that go with them, or these and the operators' parameters for them; at the end, how strong frizz is for all that
  * was found, and what is in the head. */
 struct pass {
-    enum { FOLLOW, STRANDS, STRAYS, CURLS, LENGTHS, LAW, POLISH, REGROUP, CENTRE, GUIDES, RESHAPE, CALIBRATE, CLEAR } kind;
+    enum { FOLLOW, STRANDS, STRAYS, CURLS, LENGTHS, LAW, ALIGN, POLISH, REGROUP, CENTRE, GUIDES, RESHAPE, CALIBRATE, CLEAR } kind;
     uint32_t round;
     uint32_t op, active; /* of STRANDS, CURLS, LENGTHS and LAW: its index in the chain, and among those that are enabled */
     enum { AROUND, WHOLE, BEYOND } look; /* of CURLS and LAW: around what was found, at the whole range, or at more
@@ -185,10 +186,11 @@ static uint32_t list_round(const struct groom_fit *fit, uint32_t round, int last
     if (n == 0 && !draws_anything(fit->groom))
         return 0;
     passes[n++] = (struct pass){.kind = STRAYS, .round = round};
-    if (n_curls > 0) {
+    if (n_curls > 0)
         passes[n++] = (struct pass){.kind = POLISH, .round = round};
+    passes[n++] = (struct pass){.kind = ALIGN, .round = round};
+    if (n_curls > 0)
         n += list_curls(fit->groom, round, 1, passes + n);
-    }
     passes[n++] = (struct pass){.kind = POLISH, .round = round, .last = last};
     if (last && fit->options.stages.randoms.refinements > 0)
         passes[n++] = (struct pass){.kind = CALIBRATE, .round = round};
@@ -217,6 +219,7 @@ static int is_whole(const struct pass *pass)
     switch (pass->kind) {
     case LENGTHS:
     case LAW:
+    case ALIGN:
     case REGROUP:
     case CENTRE:
     case GUIDES:
@@ -427,6 +430,7 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
         return GROOM_OK;
     case CLEAR: return clear_head(fit, search, count, context, diag);
     case LENGTHS:
+    case ALIGN:
     case REGROUP:
     case CENTRE:
     case GUIDES:
@@ -520,6 +524,7 @@ static groom_status pass_step(struct groom_fit *fit, const struct pass *pass, co
     uint32_t count = step_size(fit, pass);
     groom_status st = pass->kind == CENTRE      ? centre_step(fit)
                       : pass->kind == REGROUP   ? regroup(fit, weights_of(fit, pass), context, diag)
+                      : pass->kind == ALIGN     ? align_axes(fit, context, diag)
                       : pass->kind == LENGTHS   ? lengths_step(fit, pass, context, diag)
                       : pass->kind == GUIDES    ? guides_refine(fit, context, diag)
                       : pass->kind == RESHAPE   ? reshape_step(fit, context, diag)

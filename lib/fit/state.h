@@ -13,8 +13,8 @@
 #define FIT_OWN_SEED 1u
 
 /* What is known of the axes that hair was made along: nothing yet; they are the file's; these by quarter turns; they are near
- * the frame. */
-enum fit_axes { AXES_UNKNOWN, AXES_GIVEN, AXES_QUARTER, AXES_NEAR };
+ * the frame; they are the frame, as strands tell. */
+enum fit_axes { AXES_UNKNOWN, AXES_GIVEN, AXES_QUARTER, AXES_NEAR, AXES_FOUND };
 
 struct groom_fit {
     const struct groom_allocator *allocator;
