@@ -5,7 +5,8 @@
  * bent hair is 4 to 15 times as far from its target; coily and short hair tells less. Parameters that are told along wrong
  * axes are off by 5 to 20 %.
  * Hair from the model lies along the axes of its file, unless somebody has turned it: then along none that a file
- * could name. Hair that was captured lies along none at all: where it is far from any that the model makes, the file's do. */
+ * could name. Hair that was captured lies along none at all: where it is far from any that the model makes, the file's do.
+ * Statistics leave a few degrees in doubt, which strands tell later (align.h). */
 #ifndef FIT_AXES_H
 #define FIT_AXES_H
 

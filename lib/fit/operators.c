@@ -21,11 +21,12 @@
 #include "fit/loss_determinant.h"
 #include "fit/operators.h"
 #include "fit/paper_operators.h"
+#include "fit/prune.h"
 #include "fit/trial.h"
 #include "groom/strands.h"
 #include "quality/loss_wasserstein.h"
 
-enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
+enum phase { BEFORE, SEARCH, REFINE, PRUNE, AFTER, ENDED };
 
 #define STREAM_SLICES 0x66690011u  /* and the one after it */
 #define STREAM_BATCHES 0x66690013u
@@ -42,6 +43,7 @@ enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 #define AXES_FLOOR 0.011       /* of the statistics in the step before which the hair's axes are chosen */
 #define LAST_LOOK 4            /* steps before the last, in which they are chosen again */
 #define CONVERGED 1e-3       /* share of the misfit that a step must gain, while guides are rough; */
+#define CONVERGED_ROUGHLY 1e-2 /* before some operators go; */
 #define CONVERGED_LAST 1e-5  /* when they are known: valleys are flat, and what stops on their sides remembers its way */
 #define DRAWS 8 /* of random numbers, whose mean is matched once statistics are fine: one scatters as much as the target does */
 #define SETTLING 3   /* slopes there at most */
@@ -49,18 +51,10 @@ enum phase { BEFORE, SEARCH, REFINE, AFTER, ENDED };
 
 /* --- parameters --------------------------------------------------------------------------- */
 
-/* With the axes where these are not the file's, or near them. */
-static void begin_trial(const struct groom_fit *fit, struct trial *trial)
-{
-    trial_init(fit, 0, trial);
-    if (fit->axes == AXES_NEAR)
-        trial_let_turn(trial);
-}
-
 static uint32_t count_unknowns(const struct groom_fit *fit)
 {
     struct trial trial;
-    begin_trial(fit, &trial);
+    trial_begin(fit, 0, &trial);
     return trial.n_unknowns;
 }
 
@@ -97,12 +91,10 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequ
     struct trial here, before;
     double square;
     int ended = 0;
-    trial_init(fit, frequencies_known, &here);
+    trial_begin(fit, frequencies_known, &here);
     trial_init(fit, frequencies_known, &before);
-    if (here.n_unknowns == 0 || fit->n < FEWEST_STRANDS)
+    if (before.n_unknowns == 0 || fit->n < FEWEST_STRANDS)
         return GROOM_OK;
-    if (fit->axes == AXES_NEAR)
-        trial_let_turn(&here);
     /* where axes are not known, curls were found along others than those that are matched along */
     struct matching_wanted wanted = {fit->options.stages.operators.pairs, FLOOR_LAST, fit->axes != AXES_UNKNOWN, 1};
     groom_status st = matching_create(fit, &wanted, context, &matching, diag);
@@ -237,7 +229,7 @@ static uint32_t pairs_of(const struct groom_fit *fit)
 static void begin(struct groom_fit *fit)
 {
     struct trial trial;
-    begin_trial(fit, &trial);
+    trial_begin(fit, 0, &trial);
     for (uint32_t k = 0; k < trial.n_unknowns; k++) {
         const struct unknown *unknown = &trial.unknowns[k];
         double least = fmax((unknown->random ? LEAST_RANDOM : LEAST_START) * unknown->initial, unknown->minimum);
@@ -256,7 +248,7 @@ static groom_status search_step(struct groom_fit *fit, struct matching *matching
     struct trial trial;
     double square;
     groom_status st;
-    begin_trial(fit, &trial);
+    trial_begin(fit, 0, &trial);
     if ((st = trial_misfit(matching, &trial, &square, context, diag)) != GROOM_OK ||
         (st = search_one(matching, &trial, fit->iteration, &square, context, diag)) != GROOM_OK)
         return st;
@@ -299,17 +291,23 @@ static groom_status settle(struct matching *matching, struct trial *here, double
     return st;
 }
 
+/* Unnamed operators are pruned when they have been refined; what is left is told in a step beyond the last. */
+static int is_pruned(const struct groom_fit *fit) { return fit->iteration >= fit->options.stages.operators.refinements; }
+
 static groom_status refine_step(struct groom_fit *fit, struct matching *matching, const struct groom_context *context,
                                 struct groom_diag *diag)
 {
     struct trial here;
     double square = 0;
     int converged = 0, moved = 0, last = fit->iteration + 1 >= fit->options.stages.operators.refinements;
-    begin_trial(fit, &here);
+    int to_prune = fit->options.operators_auto && !is_pruned(fit);
+    trial_begin(fit, 0, &here);
     uint32_t n_steps = floor_of(fit) <= FLOOR_LAST ? STEPS_AT_HAND : 1;
-    groom_status st = trial_refine(matching, &here, 0, n_steps, CONVERGED, &square, &converged, context, diag);
+    groom_status st = GROOM_OK;
+    if (!is_pruned(fit))
+        st = trial_refine(matching, &here, 0, n_steps, to_prune ? CONVERGED_ROUGHLY : CONVERGED, &square, &converged, context, diag);
     converged &= floor_of(fit) <= FLOOR_LAST;
-    if (st == GROOM_OK && (converged || last))
+    if (st == GROOM_OK && (converged || last) && !to_prune)
         st = settle(matching, &here, &square, context, diag);
     if (st != GROOM_OK)
         return st;
@@ -320,10 +318,20 @@ static groom_status refine_step(struct groom_fit *fit, struct matching *matching
     report_progress(&fit->report, "operators", "misfit", square, count_unknowns(fit) + fit->iteration, context);
     fit->iteration++;
     if (last || (converged && !moved)) {
-        fit->phase = AFTER;
+        fit->phase = to_prune ? PRUNE : AFTER;
         fit->iteration = 0;
     }
     return GROOM_OK;
+}
+
+static groom_status prune_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
+{
+    groom_status st = prune_operators(fit, context, diag);
+    if (st == GROOM_OK) {
+        fit->phase = REFINE;
+        fit->iteration = fit->options.stages.operators.refinements;
+    }
+    return st;
 }
 
 static groom_status try_step(struct groom_fit *fit, const struct groom_context *context, struct groom_diag *diag)
@@ -346,7 +354,7 @@ static groom_status match_step(struct groom_fit *fit, const struct groom_context
     struct trial before;
     uint32_t axes = fit->axes, looks = fit->axes_looks;
     trial_init(fit, 0, &before);
-    groom_status st = try_step(fit, context, diag);
+    groom_status st = fit->phase == PRUNE ? prune_step(fit, context, diag) : try_step(fit, context, diag);
     if (st != GROOM_OK) {
         trial_keep(&before, fit);
         fit->axes = axes;
@@ -385,6 +393,7 @@ groom_status operators_step(struct groom_fit *fit, int *ended, const struct groo
             begin(fit);
         break;
     case SEARCH:
+    case PRUNE:
     case REFINE: st = is_paper(fit) ? paper_step(fit, context, diag) : match_step(fit, context, diag); break;
     case AFTER:
         if ((st = report_losses(fit, is_paper(fit) ? fit->options.stages.operators.iterations : 1, context, diag)) == GROOM_OK)
@@ -405,7 +414,8 @@ double operators_fraction(const struct groom_fit *fit)
     switch ((enum phase)fit->phase) {
     case BEFORE: return 0;
     case SEARCH: return 0.05 + 0.3 * search;
-    case REFINE: return 0.35 + 0.6 * fmin(refined, 1);
+    case REFINE: return 0.35 + 0.5 * fmin(refined, 1);
+    case PRUNE: return 0.85;
     case AFTER: return 0.95;
     case ENDED: break;
     }
@@ -428,9 +438,10 @@ int operators_sound(const struct groom_fit *fit)
         return sound_paper(fit);
     switch ((enum phase)fit->phase) {
     case BEFORE:
+    case PRUNE:
     case AFTER: return 1;
     case SEARCH: return fit->iteration < count_unknowns(fit);
-    case REFINE: return fit->iteration < fit->options.stages.operators.refinements;
+    case REFINE: return fit->iteration < fit->options.stages.operators.refinements + (uint32_t)(fit->options.operators_auto != 0);
     case ENDED: break;
     }
     return 0;

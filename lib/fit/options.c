@@ -15,7 +15,7 @@ const struct option_row options_table[] = {
     {"/operator_guides", OPTION_U32_OR_AUTO, AT(operator_guides), ALL(0), 1, 10000,
      "Guides that operators work around, chosen among the guides. auto: half of them, a quarter where strands are few, or one for each curl where curls are small."},
     {"/operators", OPTION_OPERATORS, AT(operators), ALL(0), 0, GROOM_FIT_MAX_OPERATORS,
-     "The chain of operators, first to last. auto: scale, bend, curl, clump, frizz."},
+     "The chain of operators, first to last. auto: scale, bend, curl, clump, frizz, of which a bend, curl or clump that the hair does not need is left at 0."},
     {"/interpolation_guides", OPTION_U32, AT(interpolation_guides), ALL(3), 1, 16,
      "Guides that each strand blends."},
     {"/seed", OPTION_U64, AT(seed), ALL(1), 0, 999999999999999.0,

@@ -46,11 +46,13 @@ static double minimum_of(const struct groom_operator_parameter *parameter, doubl
     return least;
 }
 
-/* Stage initialize looked for a curl or a clump and found none: the statistics could still be met a little
- * better with one, at the price of patches, for these two move the strands of an operator guide together. */
+/* Stage initialize looked for a curl or a clump and found none, or hair was found to need no bend, curl or clump (prune.h): the
+ * statistics could still be met a little better with one, at the price of patches, where it moves the strands of an operator
+ * guide together, or of the others. */
 static int is_absent(const struct groom_operator *op)
 {
-    return (op->type == GROOM_OPERATOR_CURL || op->type == GROOM_OPERATOR_CLUMP) && op->parameter[0] == 0;
+    int may_be = op->type == GROOM_OPERATOR_BEND || op->type == GROOM_OPERATOR_CURL || op->type == GROOM_OPERATOR_CLUMP;
+    return may_be && op->parameter[0] == 0;
 }
 
 static int is_known(const struct groom_operator *op, const char *name, int frequencies_known)
@@ -107,6 +109,26 @@ void trial_let_turn(struct trial *trial)
 {
     for (int k = 0; k < 3; k++)
         trial->unknowns[trial->n_unknowns++] = (struct unknown){&trial->turn[k], -FARTHEST_TURN, FARTHEST_TURN, 0, 0, 0, 0};
+}
+
+void trial_begin(const struct groom_fit *fit, int frequencies_known, struct trial *trial)
+{
+    trial_init(fit, frequencies_known, trial);
+    if (fit->axes == AXES_NEAR)
+        trial_let_turn(trial);
+}
+
+/* Unknowns of the original point into it. */
+static float *same_place(const struct trial *from, struct trial *to, const float *value)
+{
+    return (float *)(void *)((char *)to + ((const char *)value - (const char *)from));
+}
+
+void trial_copy(const struct trial *from, struct trial *to)
+{
+    *to = *from;
+    for (uint32_t k = 0; k < to->n_unknowns; k++)
+        to->unknowns[k].value = same_place(from, to, from->unknowns[k].value);
 }
 
 void trial_keep(const struct trial *trial, struct groom_fit *fit)

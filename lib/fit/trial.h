@@ -17,7 +17,7 @@ struct unknown {
 double trial_read(const struct unknown *unknown);
 void trial_write(const struct unknown *unknown, double x); /* as near to it as its range lets it */
 
-/* The fit's operators with parameters of their own. Unknowns point into it: it is not to be copied. */
+/* The fit's operators with parameters of their own. Unknowns point into it: it is copied by trial_copy alone. */
 struct trial {
     struct groom_operator operators[GROOM_FIT_MAX_OPERATORS];
     double frame[3][3]; /* the fit's, */
@@ -31,6 +31,9 @@ struct trial {
 void trial_init(const struct groom_fit *fit, int frequencies_known, struct trial *trial);
 /* Three unknowns more: the turn. */
 void trial_let_turn(struct trial *trial);
+/* As the fit has them, and the turn where its axes are but near. */
+void trial_begin(const struct groom_fit *fit, int frequencies_known, struct trial *trial);
+void trial_copy(const struct trial *from, struct trial *to);
 /* Into the fit. */
 void trial_keep(const struct trial *trial, struct groom_fit *fit);
 
