@@ -42,12 +42,11 @@ enum phase { BEFORE, SEARCH, REFINE, PRUNE, AFTER, ENDED };
 #define SEARCH_SHARE 3         /* one pair in so many */
 #define AXES_FLOOR 0.011       /* of the statistics in the step before which the hair's axes are chosen */
 #define LAST_LOOK 4            /* steps before the last, in which they are chosen again */
-#define CONVERGED 1e-3       /* share of the misfit that a step must gain, while guides are rough; */
+#define CONVERGED 1e-3         /* share of the misfit that a step must gain, while guides are rough; */
 #define CONVERGED_ROUGHLY 1e-2 /* before some operators go; */
-#define CONVERGED_LAST 1e-5  /* when they are known: valleys are flat, and what stops on their sides remembers its way */
-#define DRAWS 8 /* of random numbers, whose mean is matched once statistics are fine: one scatters as much as the target does */
-#define SETTLING 3   /* slopes there at most */
-#define STEPS_AT_HAND 4      /* by the same slopes, near the minimum */
+#define CONVERGED_LAST 1e-5    /* when they are known: valleys are flat, and what stops on their sides remembers its way */
+#define SETTLING 3             /* rounds of slopes at the minimum of the mean of draws, at most */
+#define STEPS_AT_HAND 4        /* by the same slopes, near the minimum */
 
 /* --- parameters --------------------------------------------------------------------------- */
 
@@ -100,7 +99,7 @@ groom_status operators_refine(struct groom_fit *fit, uint32_t n_steps, int frequ
     groom_status st = matching_create(fit, &wanted, context, &matching, diag);
     if (st != GROOM_OK)
         return st;
-    st = trial_average(matching, &here, DRAWS, context, diag);
+    st = trial_average(matching, &here, context, diag);
     for (uint32_t k = 0, last = 0; st == GROOM_OK && !last && k < n_steps; k++) {
         last = ended || k + 1 == n_steps;
         if ((st = trial_refine(matching, &here, (int)last, STEPS_AT_HAND, CONVERGED_LAST, &square, &ended, context, diag)) == GROOM_OK)
@@ -285,7 +284,7 @@ static groom_status settle(struct matching *matching, struct trial *here, double
                            struct groom_diag *diag)
 {
     int ended = 0;
-    groom_status st = trial_average(matching, here, DRAWS, context, diag);
+    groom_status st = trial_average(matching, here, context, diag);
     for (int k = 0; st == GROOM_OK && !ended && k < SETTLING; k++)
         st = trial_refine(matching, here, 1, STEPS_AT_HAND, CONVERGED, square, &ended, context, diag);
     return st;

@@ -6,7 +6,6 @@
 
 #define FLOOR 0.01      /* of the statistics */
 #define PAIRS_SHARE 3   /* one pair in so many tells */
-#define DRAWS 8         /* of random numbers */
 #define ROUNDS 2        /* of slopes, without an operator, */
 #define STEPS 4         /* and steps by each, */
 #define LEAST_GAIN 1e-2 /* which are to gain this share of the misfit */
@@ -98,7 +97,7 @@ static groom_status prune(struct pruning *p, const struct groom_context *context
 {
     struct trial all;
     trial_begin(p->fit, 0, &all);
-    groom_status st = trial_average(p->matching, &all, DRAWS, context, diag);
+    groom_status st = trial_average(p->matching, &all, context, diag);
     if (st == GROOM_OK)
         st = trial_misfit(p->matching, &all, &p->square, context, diag);
     while (st == GROOM_OK) {

@@ -1,9 +1,8 @@
 /* Operators that hair does not need.
  *
- * Where nobody names the operators, all five are fitted. One that the hair was not made with then meets a part of what
- * another one does, a little better than that alone would, as chance has it: straight hair's scale was told 20 % low beside
- * curls of a tenth of a millimetre, spiky hair's 45 %. So what statistics are met about as well without is left out, and the
- * others are told again. */
+ * Where nobody names the operators, all five are fitted. Those that the hair was not made with then meet a little of what
+ * chance does: curls of a tenth of a millimetre, bends of a degree, as sliders that do nothing and numbers that are looked for
+ * in vain. So what statistics are met about as well without is left out, and the others are told again. */
 #ifndef FIT_PRUNE_H
 #define FIT_PRUNE_H
 

@@ -17,6 +17,7 @@
 #define PROBE_SIZE 0.1         /* of the logarithm of a size: wide, so that rounding of strands does not show in a slope */
 #define LONGEST_STEP 0.7       /* of a parameter in one step of refinement */
 #define LONGEST_START 0.2      /* the same of where a bend or curl sets in */
+#define DRAWS 8                /* of random numbers, whose mean is matched: one scatters as much as the target does */
 #define DAMPING_FLOOR 0.1      /* keeps parameters that nothing speaks for where they are */
 
 /* --- parameters --------------------------------------------------------------------------- */
@@ -156,14 +157,14 @@ static groom_status residual_of(struct matching *matching, const struct trial *t
     return matching_residual(matching, trial->operators, (const double (*)[3])axes, residual, context, diag);
 }
 
-groom_status trial_average(struct matching *matching, const struct trial *trial, uint32_t n_draws,
-                           const struct groom_context *context, struct groom_diag *diag)
+groom_status trial_average(struct matching *matching, const struct trial *trial, const struct groom_context *context,
+                           struct groom_diag *diag)
 {
     double axes[3][3];
     if (progress_cancelled(context))
         return groom_fail(diag, GROOM_ECANCELLED, "cancelled in stage operators");
     frame_turned((const double (*)[3])trial->frame, trial->turn, axes);
-    return matching_average(matching, trial->operators, (const double (*)[3])axes, n_draws, context, diag);
+    return matching_average(matching, trial->operators, (const double (*)[3])axes, DRAWS, context, diag);
 }
 
 groom_status trial_misfit(struct matching *matching, const struct trial *trial, double *square,

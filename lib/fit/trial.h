@@ -37,9 +37,9 @@ void trial_copy(const struct trial *from, struct trial *to);
 /* Into the fit. */
 void trial_keep(const struct trial *trial, struct groom_fit *fit);
 
-/* From now on, by the mean of so many draws of random numbers: matching_average. returns GROOM_OK, GROOM_ENOMEM, GROOM_ECANCELLED */
-GROOM_MUST_CHECK groom_status trial_average(struct matching *matching, const struct trial *trial, uint32_t n_draws,
-                                            const struct groom_context *context, struct groom_diag *diag);
+/* From now on, by the mean of some draws of random numbers: matching_average. returns GROOM_OK, GROOM_ENOMEM, GROOM_ECANCELLED */
+GROOM_MUST_CHECK groom_status trial_average(struct matching *matching, const struct trial *trial, const struct groom_context *context,
+                                            struct groom_diag *diag);
 
 /* Sum of the squares of matching_residual. returns GROOM_OK, GROOM_ENOMEM, GROOM_ECANCELLED; *square is INFINITY then */
 GROOM_MUST_CHECK groom_status trial_misfit(struct matching *matching, const struct trial *trial, double *square,
