@@ -22,6 +22,7 @@
 #define LEAST_GAIN 1e-2   /* which are to gain this share of the misfit */
 #define NOT_OF_THE_MODEL 2000 /* a misfit, where the model's own hair is less than 1 000 off even with rough parameters: such
                            * hair was made along no axes, and what fits it a little better here is no better anywhere else */
+#define SMALL 200         /* strands, fewer of which do not tell axes apart that are much alike */
 #define QUARTERS 24
 #define AROUND 8         /* turns about one of the hair's own axes */
 #define HAIRS (4 * AROUND)
@@ -34,6 +35,8 @@ static const struct { double factor, more; } prior[] = {
              [AXES_FOUND] = {1, 22}};
 
 static double weighed(double square, uint32_t axes) { return prior[axes].factor * square + prior[axes].more; }
+
+static int is_small(const struct groom_fit *fit) { return fit->n < SMALL; }
 
 struct candidate {
     double frame[3][3], square; /* of the misfit, weighed */
@@ -183,7 +186,7 @@ static groom_status look_around(const struct groom_fit *fit, struct matching *ma
     n = add_best(found, n, n + 1, quarter, QUARTERS, INFINITY);
     double farthest = WORTH_TURNING * found[best_of(found, n)].square;
     const struct candidate *best = &found[best_of(found, n)];
-    int given = best->axes == AXES_GIVEN && best->square <= hair[best_of(hair, HAIRS)].square;
+    int given = is_small(fit) || (best->axes == AXES_GIVEN && best->square <= hair[best_of(hair, HAIRS)].square);
     n_turned = add_best(turned, 0, given ? FEW_TURNED : MOST_TURNED, hair, HAIRS, farthest);
     if ((st = turn(fit, matching, turned, n_turned, context, diag)) == GROOM_OK)
         *n_found = add_best(found, n, given ? FEW_TRIED : MOST_TRIED, turned, n_turned, INFINITY);
@@ -216,7 +219,7 @@ static groom_status try_along(const struct groom_fit *fit, struct matching *matc
         memcpy(trial[k].frame, found[k].frame, sizeof trial[k].frame);
         found[k].square = 0;
     }
-    for (int round = 0; round < ROUNDS_ALONG; round++) {
+    for (int round = 0; round < (is_small(fit) ? ROUNDS : ROUNDS_ALONG); round++) {
         double farthest = BEHIND * found[best_of(found, n)].square;
         for (uint32_t k = 0; st == GROOM_OK && k < n; k++) {
             double square = 0;

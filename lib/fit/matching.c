@@ -9,6 +9,7 @@
 #include "fit/frame.h"
 #include "groom/strands.h"
 
+#define FEWEST_PAIRS 100      /* of which more draws are worth their time: what fewer tell is rough at any rate */
 #define NEIGHBOURS 8          /* of which a partner is chosen */
 #define LEAST_PEAK 4          /* of the frequencies, from lowest: 3.6 turns of a strand */
 #define DUPLICATE_SHARE 0.01  /* of the usual squared distance to a neighbour: closer ones are duplicates */
@@ -378,6 +379,8 @@ groom_status matching_average(struct matching *matching, const struct groom_oper
                               uint32_t n_draws, const struct groom_context *context, struct groom_diag *diag)
 {
     double sum[MOMENTS_COUNT] = {0}, mean[MOMENTS_COUNT] = {0};
+    if (matching->plan.n_pairs < FEWEST_PAIRS)
+        return GROOM_OK;
     set_operators(matching, operators, axes);
     for (uint32_t draw = n_draws; draw-- > 0;) { /* ends with the first, which is left to be simulated */
         groom_status st = simulate_draw(matching, draw, mean, context, diag);

@@ -26,7 +26,8 @@ GROOM_MUST_CHECK groom_status matching_create(const struct groom_fit *fit, const
 void matching_destroy(struct matching *matching); /* takes NULL */
 
 /* Statistics of one draw scatter as much as the target's own do. From now on residuals are of the mean of n_draws: of the draw
- * that is simulated, moved by how far it is from that mean at these operators, which changes little with them. n_draws > 0
+ * that is simulated, moved by how far it is from that mean at these operators, which changes little with them; but of few pairs one draw is
+ * enough. n_draws > 0
  * returns    GROOM_OK, GROOM_ENOMEM: the matching is of no use then
  * threads    same bits for any pool */
 GROOM_MUST_CHECK groom_status matching_average(struct matching *matching, const struct groom_operator *operators,

@@ -299,7 +299,7 @@ static groom_status refine_step(struct groom_fit *fit, struct matching *matching
     struct trial here;
     double square = 0;
     int converged = 0, moved = 0, last = fit->iteration + 1 >= fit->options.stages.operators.refinements;
-    int to_prune = fit->options.operators_auto && !is_pruned(fit);
+    int to_prune = prune_tells(fit) && !is_pruned(fit);
     trial_begin(fit, 0, &here);
     uint32_t n_steps = floor_of(fit) <= FLOOR_LAST ? STEPS_AT_HAND : 1;
     groom_status st = GROOM_OK;
@@ -440,7 +440,7 @@ int operators_sound(const struct groom_fit *fit)
     case PRUNE:
     case AFTER: return 1;
     case SEARCH: return fit->iteration < count_unknowns(fit);
-    case REFINE: return fit->iteration < fit->options.stages.operators.refinements + (uint32_t)(fit->options.operators_auto != 0);
+    case REFINE: return fit->iteration < fit->options.stages.operators.refinements + (uint32_t)(prune_tells(fit) != 0);
     case ENDED: break;
     }
     return 0;

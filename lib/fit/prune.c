@@ -5,6 +5,7 @@
 #include "fit/trial.h"
 
 #define FLOOR 0.01      /* of the statistics */
+#define FEWEST_STRANDS 200 /* that tell what chance does from what operators do: with fewer, all stay */
 #define PAIRS_SHARE 3   /* one pair in so many tells */
 #define ROUNDS 2        /* of slopes, without an operator, */
 #define STEPS 4         /* and steps by each, */
@@ -13,6 +14,8 @@
                          * parameter, while one that hair was made with is missed by a hundred at least */
 #define SORELY 200.0    /* the same of one that no other could stand in for, which is not asked of again */
 #define NONE UINT32_MAX
+
+int prune_tells(const struct groom_fit *fit) { return fit->options.operators_auto && fit->n >= FEWEST_STRANDS; }
 
 static int may_go(const struct groom_operator *op)
 {

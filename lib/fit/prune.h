@@ -8,6 +8,9 @@
 
 #include "fit/state.h"
 
+/* Whether the operators were not named, and there are strands enough to tell which are needed. */
+int prune_tells(const struct groom_fit *fit);
+
 /* One after the other, the bend, curl or clump that is missed least has no effect from now on (its first parameter is 0, the
  * others as operators begin), until one is missed; the parameters of the others go along. A note says which.
  * returns  GROOM_OK, GROOM_ENOMEM, GROOM_ECANCELLED; parameters may have changed on error */
