@@ -57,8 +57,8 @@
 
 /* What is looked for: which operator guide each strand follows, the numbers of strands in one operator, both at once of
  * strands that are far off, the numbers of operator guides, what the strands of these are long, the law that these
- * follow, the axes that all lean on, the last digits of all that a strand has, which bundles are two, what numbers tell of how long guides are, the
- * guides that go with them, or these and the operators' parameters for them; at the end, how strong frizz is for all that
+ * follow, the axes that all lean on, the last digits of all that a strand has, which bundles are two, what numbers tell of
+ * how long guides are, the guides that go with them, or these and the operators' parameters for them; at the end, how strong frizz is for all that
  * was found, and what is in the head. */
 struct pass {
     enum { FOLLOW, STRANDS, STRAYS, CURLS, LENGTHS, LAW, ALIGN, POLISH, REGROUP, CENTRE, GUIDES, RESHAPE, CALIBRATE, CLEAR } kind;

@@ -64,3 +64,12 @@ const struct groom_fit_loss *fits_loss(const struct groom_fit *fit, const char *
     ck_abort_msg("no loss %s of stage %s", name, stage);
     return NULL;
 }
+
+int fits_is_noted(const struct groom_fit *fit, const char *words)
+{
+    const struct groom_fit_report *report = groom_fit_get_report(fit);
+    for (uint32_t i = 0; i < report->n_notes; i++)
+        if (strstr(report->notes[i], words))
+            return 1;
+    return 0;
+}

@@ -17,4 +17,7 @@ size_t fits_finish_without_memory(struct groom_fit *fit);
 
 const struct groom_fit_loss *fits_loss(const struct groom_fit *fit, const char *stage, const char *name);
 
+/* Whether one of the report's notes holds these words. */
+int fits_is_noted(const struct groom_fit *fit, const char *words);
+
 #endif

@@ -1,5 +1,7 @@
 #include "tests/support/invariance.h"
 
+#include <math.h>
+
 #include "groom/format.h"
 #include "groom/mesh.h"
 #include "groom/strands.h"
@@ -66,4 +68,12 @@ void invariance_turn(struct groom_sample *sample, const double r[3][3])
 {
     invariance_turn_points(sample->capture->points, sample->capture->n_vertices, r);
     invariance_turn_points(sample->head->points, sample->head->n_vertices, r);
+}
+
+double invariance_degrees(const double a[3][3], const double b[3][3])
+{
+    double trace = 0;
+    for (int k = 0; k < 9; k++)
+        trace += a[k / 3][k % 3] * b[k / 3][k % 3];
+    return acos(fmin(fmax((trace - 1) / 2, -1), 1)) * 180 / acos(-1);
 }

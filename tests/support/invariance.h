@@ -14,4 +14,7 @@ void invariance_upload(struct groom_sample *sample, struct groom_frame frame);
 void invariance_turn(struct groom_sample *sample, const double r[3][3]);
 void invariance_turn_points(float (*x)[3], size_t n, const double r[3][3]);
 
+/* By how much axes are turned against each other. */
+double invariance_degrees(const double a[3][3], const double b[3][3]);
+
 #endif

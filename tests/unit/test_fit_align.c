@@ -14,14 +14,6 @@
 
 enum { N = 500, M = 100 };
 
-static double degrees_between(const double a[3][3], const double b[3][3])
-{
-    double trace = 0;
-    for (int k = 0; k < 9; k++)
-        trace += a[k / 3][k % 3] * b[k / 3][k % 3];
-    return acos(fmin(fmax((trace - 1) / 2, -1), 1)) * 180 / acos(-1);
-}
-
 /* A fit whose groom is the truth, with axes that are off by so many degrees. */
 static struct groom_fit *fit_off_by(groom_sample_style style, double degrees, struct groom_sample **sample)
 {
@@ -50,7 +42,7 @@ static void are_told(groom_sample_style style, double degrees)
     struct groom_fit *fit = fit_off_by(style, degrees, &sample);
     ck_ok(align_axes(fit, NULL, NULL));
     ck_assert_uint_eq(fit->axes, AXES_FOUND);
-    double left = degrees_between((const double (*)[3])fit->frame, invariance_as_it_is);
+    double left = invariance_degrees((const double (*)[3])fit->frame, invariance_as_it_is);
     ck_assert_msg(left < 0.1, "%g degrees", left);
     finish(fit, sample);
 }
@@ -129,7 +121,7 @@ START_TEST(hair_that_was_turned_is_found_as_it_was)
     struct groom_fit_options options = known_options(sample, 0);
     struct groom_fit *fit = guides_fit(sample, &options, "", NULL);
     ck_assert_uint_eq(fit->axes, AXES_FOUND);
-    ck_assert_double_lt(degrees_between((const double (*)[3])fit->frame, (const double (*)[3])made), 0.2);
+    ck_assert_double_lt(invariance_degrees((const double (*)[3])fit->frame, (const double (*)[3])made), 0.2);
     finish(fit, sample);
 }
 END_TEST

@@ -114,14 +114,6 @@ START_TEST(waves_are_found_which_axis_was_up)
 }
 END_TEST
 
-static double degrees_between(const double a[3][3], const double b[3][3])
-{
-    double trace = 0;
-    for (int k = 0; k < 9; k++)
-        trace += a[k / 3][k % 3] * b[k / 3][k % 3];
-    return acos(fmin(fmax((trace - 1) / 2, -1), 1)) * 180 / acos(-1);
-}
-
 /* Turned askew, hair is known by how it falls: the frame stays one, and comes near the one that the hair was made along;
  * parameters are those that the hair is told as it is. */
 static void are_found_askew(groom_sample_style style, double most_degrees)
@@ -135,7 +127,7 @@ static void are_found_askew(groom_sample_style style, double most_degrees)
         made[k / 3][k % 3] = invariance_slanted[k % 3][k / 3];
     ck_assert_uint_eq(fit->axes, AXES_NEAR);
     is_rotation((const double (*)[3])fit->frame);
-    ck_assert_double_lt(degrees_between((const double (*)[3])fit->frame, (const double (*)[3])made), most_degrees);
+    ck_assert_double_lt(invariance_degrees((const double (*)[3])fit->frame, (const double (*)[3])made), most_degrees);
     uint32_t n = known_parameters(fit->groom, given->groom, parameter);
     for (uint32_t k = 0; k < n; k++)
         ck_assert_msg(fabs(parameter[k].error) < 5, "%s.%s moves by %.1f %%", parameter[k].of, parameter[k].name, parameter[k].error);

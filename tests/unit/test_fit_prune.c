@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "fit/prune.h"
+#include "tests/support/fits.h"
 #include "tests/support/guides.h"
 #include "tests/support/known.h"
 #include "tests/support/test.h"
@@ -24,14 +25,6 @@ static const struct groom_operator *operator_of(const struct groom *groom, groom
         if (groom->operators[o].type == type)
             return &groom->operators[o];
     return NULL;
-}
-
-static int says(const struct groom_fit *fit, const char *words)
-{
-    for (uint32_t i = 0; i < fit->report.n_notes; i++)
-        if (strstr(fit->report.notes[i], words))
-            return 1;
-    return 0;
 }
 
 /* Those that the truth was made with have an effect, the others none, which the report says. */
@@ -62,8 +55,8 @@ START_TEST(a_note_says_what_went_and_sliders_are_as_they_begin)
     struct groom_fit *fit = fit_of(sample, 1, "randoms");
     const struct groom_operator *bend = operator_of(fit->groom, GROOM_OPERATOR_BEND);
     uint32_t n;
-    ck_assert(says(fit, "without bend"));
-    ck_assert(!says(fit, "without clump"));
+    ck_assert(fits_is_noted(fit, "without bend"));
+    ck_assert(!fits_is_noted(fit, "without clump"));
     ck_assert_float_eq(bend->parameter[1], groom_operator_parameters(GROOM_OPERATOR_BEND, &n)[1].initial);
     groom_fit_destroy(fit);
     groom_sample_destroy(sample);
@@ -77,7 +70,7 @@ START_TEST(named_operators_stay)
     struct groom_fit *fit = fit_of(sample, 0, "randoms");
     ck_assert_uint_eq(fit->groom->n_operators, 5);
     ck_assert_float_ne(operator_of(fit->groom, GROOM_OPERATOR_BEND)->parameter[0], 0);
-    ck_assert(!says(fit, "without bend"));
+    ck_assert(!fits_is_noted(fit, "without bend"));
     groom_fit_destroy(fit);
     groom_sample_destroy(sample);
 }

@@ -6,6 +6,7 @@
 #include "fit/refine.h"
 #include "groom/mesh.h"
 #include "groom/strands.h"
+#include "tests/support/fits.h"
 #include "tests/support/guides.h"
 #include "tests/support/test.h"
 
@@ -56,14 +57,6 @@ static struct groom *groom_of(const struct groom_fit *fit)
     return groom;
 }
 
-static int is_noted(const struct groom_fit *fit, const char *words)
-{
-    for (uint32_t i = 0; i < fit->report.n_notes; i++)
-        if (strstr(fit->report.notes[i], words))
-            return 1;
-    return 0;
-}
-
 /* Three strands 30 m off, and one of 10 m: the others become the groom that they were without them. */
 START_TEST(strands_from_elsewhere_change_nothing_for_the_others)
 {
@@ -74,7 +67,7 @@ START_TEST(strands_from_elsewhere_change_nothing_for_the_others)
     struct groom *a = groom_of(without), *b = groom_of(with);
     ck_assert_uint_eq(with->report.n_outliers, 4);
     ck_assert_uint_eq(without->report.n_outliers, 0);
-    ck_assert(is_noted(with, "too far from the others"));
+    ck_assert(fits_is_noted(with, "too far from the others"));
     ck_assert_uint_eq(b->n_strands, a->n_strands + 4);
     ck_assert_mem_eq(a->guides, b->guides, (size_t)a->n_guides * M * sizeof *a->guides);
     ck_assert_mem_eq(a->instancing_weight, b->instancing_weight, (size_t)a->n_strands * a->n_instancing * sizeof(float));
@@ -157,7 +150,7 @@ START_TEST(a_head_that_is_elsewhere_is_told)
         sample->head->points[v][0] += 2;
     struct groom_fit *fit = fitted(sample->capture, sample->head);
     ck_assert_uint_eq(fit->report.n_detached, N);
-    ck_assert(is_noted(fit, "is it the head of this hair"));
+    ck_assert(fits_is_noted(fit, "is it the head of this hair"));
     groom_destroy(groom_of(fit));
     groom_fit_destroy(fit);
     groom_sample_destroy(sample);
