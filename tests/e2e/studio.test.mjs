@@ -99,11 +99,13 @@ test('from files to a groom, a knob, back, and home', { skip, timeout: 300000 },
     await page.locator('.commands summary').click();
   });
   await t.test('the server draws what the page shows', async () => {
-    await page.waitForFunction(() => {
-      const { canvas } = window.studio.viewer, [width, height] = new URL(document.querySelector('form[aria-label=Picture] a').href).searchParams.get('size').split('x');
-      return Math.abs(width / height - canvas.clientWidth / canvas.clientHeight) < 0.01;
+    // The link follows the canvas a moment later, so both are read at once, when they agree.
+    const agreed = await page.waitForFunction(() => {
+      const { href } = document.querySelector('form[aria-label=Picture] a'), { clientWidth, clientHeight } = window.studio.viewer.canvas;
+      const [width, height] = new URL(href).searchParams.get('size').split('x');
+      return Math.abs(width / height - clientWidth / clientHeight) < 0.01 && { href, sizes: [clientWidth, clientHeight] };
     });
-    const { href, sizes } = await page.evaluate(() => ({ href: document.querySelector('form[aria-label=Picture] a').href, sizes: [window.studio.viewer.canvas.clientWidth, window.studio.viewer.canvas.clientHeight] }));
+    const { href, sizes } = await agreed.jsonValue();
     const drawing = await daemon.fetch(href), bytes = Buffer.from(await drawing.arrayBuffer());
     assert.equal(drawing.status, 200);
     assert.ok(Math.abs(bytes.readUInt32BE(16) / bytes.readUInt32BE(20) - sizes[0] / sizes[1]) < 0.01, 'the page’s shape');
