@@ -18,4 +18,9 @@ void parallel_for(const struct groom_context *context, uint32_t n_pieces, parall
 /* How many threads parallel_for may use here: the number of scratch areas to allocate. */
 uint32_t parallel_threads(const struct groom_context *context);
 
+/* What is the same in the whole process: filled by the first thread that asks; whoever else asks waits for it. Static, all
+ * zeroes before. */
+struct parallel_once { _Atomic int filled; };
+void parallel_once(struct parallel_once *once, void (*fill)(void));
+
 #endif

@@ -183,4 +183,16 @@ void parallel_for(const struct groom_context *context, uint32_t n_pieces, parall
     atomic_init(&loop.next_piece, 0);
     run_in_pool(pool, &loop);
 }
+
+void parallel_once(struct parallel_once *once, void (*fill)(void))
+{
+    static pthread_mutex_t filling = PTHREAD_MUTEX_INITIALIZER;
+    if (atomic_load_explicit(&once->filled, memory_order_acquire))
+        return;
+    pthread_mutex_lock(&filling);
+    if (!atomic_load_explicit(&once->filled, memory_order_relaxed))
+        fill();
+    atomic_store_explicit(&once->filled, 1, memory_order_release);
+    pthread_mutex_unlock(&filling);
+}
 #endif

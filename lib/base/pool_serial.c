@@ -34,6 +34,13 @@ void parallel_for(const struct groom_context *context, uint32_t n_pieces, parall
     for (uint32_t piece = 0; piece < n_pieces; piece++)
         body(user, piece, 0);
 }
+
+void parallel_once(struct parallel_once *once, void (*fill)(void))
+{
+    if (!once->filled)
+        fill();
+    once->filled = 1;
+}
 #else
 typedef int pool_serial_is_for_targets_without_threads;
 #endif

@@ -1,6 +1,8 @@
 /* The table of cubics that evaluations take the frizz's noise from. */
 #include "model/noise.h"
 
+#include "base/parallel.h"
+
 #define FIRST_BETWEEN 0.29289322 /* 1/2 -+ tan(pi/8)/2: Chebyshev's four points, stretched to the ends */
 #define SECOND_BETWEEN 0.70710678
 
@@ -32,12 +34,21 @@ static void cubic_through(const double y[4], float cubic[4])
     cubic[3] = (float)cube;
 }
 
-void noise_fill(float (*cubic)[4])
+static float table[NOISE_TABLE][4];
+
+static void fill(void)
 {
     double end = epsilon_at(0, 0.0);
     for (uint32_t piece = 0; piece < NOISE_TABLE; piece++) {
         double y[4] = {end, epsilon_at(piece, FIRST_BETWEEN), epsilon_at(piece, SECOND_BETWEEN), epsilon_at(piece, 1.0)};
-        cubic_through(y, cubic[piece]);
+        cubic_through(y, table[piece]);
         end = y[3];
     }
+}
+
+const float (*noise_table(void))[4]
+{
+    static struct parallel_once once;
+    parallel_once(&once, fill);
+    return (const float(*)[4])table;
 }

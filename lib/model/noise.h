@@ -92,7 +92,8 @@ LANES_INLINE float noise_epsilon_slope(float t, float *epsilon)
 #define NOISE_NEAR 96 /* chi from 0 to below this is looked up, on all axes */
 #define NOISE_TABLE ((NOISE_NEAR + 72) * NOISE_PIECES)
 
-/* cubic [NOISE_TABLE]: epsilon(t) = c0 + f (c1 + f (c2 + f c3)) in piece floor(NOISE_PIECES t), f the fraction */
-void noise_fill(float (*cubic)[4]);
+/* [NOISE_TABLE]: epsilon(t) = c0 + f (c1 + f (c2 + f c3)) in piece floor(NOISE_PIECES t), f the fraction. One for all,
+ * worked out once in a process: that takes as long as some hundred strands. From any thread. */
+const float (*noise_table(void))[4];
 
 #endif

@@ -101,15 +101,6 @@ static groom_status make_relative(struct plan *plan, const uint32_t *strand, uin
     return made && plan->relative ? GROOM_OK : GROOM_ENOMEM;
 }
 
-static groom_status fill_noise(struct plan *plan)
-{
-    plan->noise = memory_array(plan->allocator, NOISE_TABLE, sizeof *plan->noise);
-    if (!plan->noise)
-        return GROOM_ENOMEM;
-    noise_fill(plan->noise);
-    return GROOM_OK;
-}
-
 groom_status plan_init(struct plan *plan, const struct groom *groom, const uint32_t *strand, uint32_t first,
                        uint32_t count, enum kernel_variant variant, const struct groom_context *context)
 {
@@ -123,8 +114,8 @@ groom_status plan_init(struct plan *plan, const struct groom *groom, const uint3
         status = make_relative(plan, strand, first, count);
     if (status == GROOM_OK && (plan->bends || plan->curls))
         status = compute_frames(plan, strand, first, count, context);
-    if (status == GROOM_OK && plan->frizzes)
-        status = fill_noise(plan);
+    if (plan->frizzes)
+        plan->noise = noise_table();
     if (status != GROOM_OK)
         plan_finish(plan);
     return status;
@@ -140,7 +131,6 @@ void plan_finish(struct plan *plan)
                    sizeof *plan->relative);
     memory_release(plan->allocator, plan->frame, n * width, sizeof(float));
     memory_release(plan->allocator, plan->axis, n * AXIS_WIDTH, sizeof(float));
-    memory_release(plan->allocator, plan->noise, NOISE_TABLE, sizeof *plan->noise);
     *plan = (struct plan){0};
 }
 
@@ -245,7 +235,7 @@ struct kernel_inputs plan_inputs(const struct plan *plan, const struct block *bl
 {
     const struct groom_operator *op = &plan->groom->operators[plan->active[a]];
     struct kernel_inputs in = {.m = w->m, .root = (const lanes *)w->root, .guide = w->guide, .frame = w->frame, .axis = w->axis,
-                               .noise = (const float(*)[4])plan->noise, .axes = plan->axes};
+                               .noise = plan->noise, .axes = plan->axes};
     memcpy(in.parameter, op->parameter, sizeof in.parameter);
     for (uint32_t r = 0; r < groom_operator_random_arrays(op->type); r++)
         for (uint32_t l = 0; l < LANES; l++) {

@@ -17,7 +17,7 @@ struct plan {
     float *relative;        /* [n_g][3m] guides relative to their roots, where the groom has no base */
     float *frame;           /* [n_gop][FRAME_WIDTH * m] where it curls */
     float *axis;            /* [n_gop][AXIS_WIDTH] where it bends */
-    float (*noise)[4];      /* [NOISE_TABLE] where it frizzes */
+    const float (*noise)[4]; /* [NOISE_TABLE] where it frizzes */
     const struct groom_allocator *allocator;
 };
 
