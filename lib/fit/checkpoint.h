@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 
-#define CHECKPOINT_VERSION 11
+#define CHECKPOINT_VERSION 12
 
 struct checkpoint_header {
     char magic[8];          /* "GROOMFIT" */

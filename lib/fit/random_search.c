@@ -11,6 +11,7 @@
 
 #define MOST_INSTANCES 8       /* guides of a strand */
 #define MOST_RANKED (MOST_INSTANCES + RANDOM_SEARCH_SKIP)
+#define VALLEYS 4              /* of a rugged error that are followed to their floors */
 
 /* --- life ------------------------------------------------------------------------------- */
 
@@ -43,48 +44,93 @@ struct strands_job {
     uint32_t active, first, count, n_grid, n_halvings;
     float minimum, maximum;
     float *u;
+    int n_valleys; /* VALLEYS at most */
 };
 
-/* Keeps what is better. */
-static void try_values(const struct strands_job *job, struct random_search_memory *memory, const lanes value, lanes best,
-                       lanes least)
+/* The deepest valleys of a strand's error that were met, the best first. */
+struct valleys { lanes value[VALLEYS], least[VALLEYS]; };
+
+static void evaluate_values(const struct strands_job *job, struct random_search_memory *memory, const lanes value, lanes error)
 {
-    lanes error;
     memcpy(memory->in[job->active].random[0], value, sizeof(lanes));
     random_block_evaluate(job->search, memory, random_block_before(memory, job->active), job->active, error);
-    for (int l = 0; l < LANES; l++)
-        if (error[l] < least[l]) {
-            least[l] = error[l];
-            best[l] = value[l];
-        }
 }
 
-static void search_block(const struct strands_job *job, struct random_search_memory *memory, const struct block *block)
+/* A new valley of lane l, where it is among the deepest. */
+static void add_valley(struct valleys *valleys, int l, float value, float error)
 {
-    float range = job->maximum - job->minimum, step = range / (float)job->n_grid;
-    lanes value, best, least;
-    random_block_load(job->search, memory, block, job->active);
-    memcpy(best, memory->in[job->active].random[0], sizeof best);
-    for (int l = 0; l < LANES; l++)
-        least[l] = INFINITY;
-    try_values(job, memory, best, best, least);
-    for (uint32_t k = 0; k < job->n_grid; k++) {
-        for (int l = 0; l < LANES; l++)
-            value[l] = job->minimum + ((float)k + 0.5f) * step;
-        try_values(job, memory, value, best, least);
+    int at = VALLEYS;
+    for (; at > 0 && error < valleys->least[at - 1][l]; at--)
+        if (at < VALLEYS) {
+            valleys->value[at][l] = valleys->value[at - 1][l];
+            valleys->least[at][l] = valleys->least[at - 1][l];
+        }
+    if (at < VALLEYS) {
+        valleys->value[at][l] = value;
+        valleys->least[at][l] = error;
     }
+}
+
+/* Over the whole range, values that are better than both of their neighbours; and the present one. */
+static void look_around(const struct strands_job *job, struct random_search_memory *memory, float step, struct valleys *valleys)
+{
+    lanes value, error, last = {0}, falls = {0};
+    memcpy(value, memory->in[job->active].random[0], sizeof value);
+    for (int v = 0; v < VALLEYS; v++)
+        for (int l = 0; l < LANES; l++)
+            valleys->value[v][l] = value[l], valleys->least[v][l] = INFINITY;
+    evaluate_values(job, memory, value, valleys->least[0]);
+    for (uint32_t k = 0; k <= job->n_grid; k++) {
+        float here = job->minimum + ((float)k + 0.5f) * step;
+        for (int l = 0; l < LANES; l++)
+            value[l] = here;
+        if (k < job->n_grid)
+            evaluate_values(job, memory, value, error);
+        for (int l = 0; l < LANES; l++) {
+            int rises = k == job->n_grid || !(error[l] < last[l]);
+            if (falls[l] != 0 && rises)
+                add_valley(valleys, l, here - step, last[l]);
+            falls[l] = k == 0 || !rises;
+            last[l] = error[l];
+        }
+    }
+}
+
+/* Down to the floor of one of them. */
+static void descend(const struct strands_job *job, struct random_search_memory *memory, float step, lanes best, lanes least)
+{
     for (uint32_t h = 0; h < job->n_halvings; h++) {
-        lanes centre;
+        lanes centre, value, error;
         memcpy(centre, best, sizeof centre);
         step *= 0.5f;
         for (int side = -1; side <= 1; side += 2) {
             for (int l = 0; l < LANES; l++)
                 value[l] = fminf(fmaxf(centre[l] + (float)side * step, job->minimum), job->maximum);
-            try_values(job, memory, value, best, least);
+            evaluate_values(job, memory, value, error);
+            for (int l = 0; l < LANES; l++)
+                if (error[l] < least[l]) {
+                    least[l] = error[l];
+                    best[l] = value[l];
+                }
         }
     }
-    for (uint32_t l = 0; l < block->n; l++)
-        job->u[block->strand[l]] = best[l];
+}
+
+static void search_block(const struct strands_job *job, struct random_search_memory *memory, const struct block *block)
+{
+    float step = (job->maximum - job->minimum) / (float)job->n_grid;
+    struct valleys valleys;
+    random_block_load(job->search, memory, block, job->active);
+    look_around(job, memory, step, &valleys);
+    for (int v = 0; v < job->n_valleys; v++)
+        descend(job, memory, step, valleys.value[v], valleys.least[v]);
+    for (uint32_t l = 0; l < block->n; l++) {
+        int best = 0;
+        for (int v = 1; v < job->n_valleys; v++)
+            if (valleys.least[v][l] < valleys.least[best][l])
+                best = v;
+        job->u[block->strand[l]] = valleys.value[best][l];
+    }
 }
 
 static void search_piece(void *user, uint32_t piece, uint32_t thread)
@@ -103,6 +149,9 @@ static const struct groom_operator *operator_of(const struct random_search *sear
     return &search->plan.groom->operators[search->plan.active[active]];
 }
 
+/* Noise has hills and valleys all over its range. */
+static int is_rugged(const struct groom_operator *op) { return op->type == GROOM_OPERATOR_FRIZZ; }
+
 void random_search_strands(struct random_search *search, uint32_t active, uint32_t first, uint32_t count,
                            uint32_t n_grid, uint32_t n_halvings, const struct groom_context *context)
 {
@@ -110,7 +159,7 @@ void random_search_strands(struct random_search *search, uint32_t active, uint32
     uint32_t n_randoms;
     const struct groom_operator_random *random = groom_operator_randoms(op->type, &n_randoms);
     struct strands_job job = {search, active, first, count, n_grid, n_halvings, random[0].minimum, random[0].maximum,
-                              op->random[0]};
+                              op->random[0], is_rugged(op) ? VALLEYS : 1};
     parallel_for(context, (count + RANDOM_BLOCK_PIECE - 1) / RANDOM_BLOCK_PIECE, search_piece, &job);
 }
 
@@ -119,7 +168,7 @@ void random_search_numbers(struct random_search *search, uint32_t first, uint32_
 {
     for (uint32_t a = 0; a < search->plan.n_active; a++) {
         const struct groom_operator *op = operator_of(search, a);
-        uint32_t n = op->type == GROOM_OPERATOR_FRIZZ ? n_rugged : n_grid;
+        uint32_t n = is_rugged(op) ? n_rugged : n_grid;
         if (strand_state_draws(op))
             random_search_strands(search, a, first, count, n, n_halvings, context);
     }

@@ -34,7 +34,8 @@ void random_search_finish(struct random_search *search);
 
 /* The number of strands first .. first + count - 1 in an operator that draws one a strand.
  * n_grid   values over the whole range that are tried, besides the present one
- * n_halvings  how often the step is then halved */
+ * n_halvings  how often the step is then halved: around the best, and where the error is rugged, whose deepest valley
+ *          values may well stand beside, around the best few of those that are better than their neighbours */
 void random_search_strands(struct random_search *search, uint32_t active, uint32_t first, uint32_t count,
                            uint32_t n_grid, uint32_t n_halvings, const struct groom_context *context);
 

@@ -40,7 +40,7 @@
 #define SMOOTH_VALUES 24     /* of a number that the error is smooth in */
 #define HALVINGS 3           /* of the step around the best value: Newton's steps do the rest */
 #define STEP_WORK 1200000    /* strands times values of one step: about a second */
-#define PASSES_OF_ROUND (9 * GROOM_FIT_MAX_OPERATORS + 9) /* at most */
+#define PASSES_OF_ROUND (9 * GROOM_FIT_MAX_OPERATORS + 10) /* at most */
 #define MOST_PASSES (4 * PASSES_OF_ROUND)
 #define FEW_STRANDS 6        /* a guide: another round for curls; */
 #define SOME_STRANDS 16      /* another look at guides and curls */
@@ -48,7 +48,7 @@
 #define GAIN 0.3f            /* share of its error that another one must be better by */
 #define CURL_VALUES 256      /* about: values of a curl's numbers that are tried */
 #define DEPTH 10.0           /* what depth in the head costs, over distance */
-#define POLISH_STEPS 3       /* at the end; 1 before */
+#define POLISH_STEPS 2       /* at the end; 1 before */
 #define STRAYS_VALUES 100    /* about: as many evaluations as a look for strays costs, over all strands */
 #define CLEAR_VALUES 100     /* about: as many evaluations as a look for what is in the head costs */
 #define POLISH_VALUES 48     /* about: evaluations of them */
@@ -66,7 +66,7 @@ struct pass {
     uint32_t op, active; /* of STRANDS, CURLS, LENGTHS and LAW: its index in the chain, and among those that are enabled */
     enum { AROUND, WHOLE, BEYOND } look; /* of CURLS and LAW: around what was found, at the whole range, or at more
                                           * frequencies than there may be, for the law to begin with */
-    int last; /* of POLISH: nothing is found after it */
+    int last; /* of POLISH and STRAYS: guides and whom strands follow are what they will be */
 };
 
 static int has_effect(const struct groom_operator *op)
@@ -192,6 +192,10 @@ static uint32_t list_round(const struct groom_fit *fit, uint32_t round, int last
     if (n_curls > 0)
         n += list_curls(fit->groom, round, 1, passes + n);
     passes[n++] = (struct pass){.kind = POLISH, .round = round, .last = last};
+    if (last) { /* with weights of their own, strands tell better what is wrong with their numbers */
+        passes[n++] = (struct pass){.kind = STRAYS, .round = round, .last = 1};
+        passes[n++] = (struct pass){.kind = POLISH, .round = round, .last = 1};
+    }
     if (last && fit->options.stages.randoms.refinements > 0)
         passes[n++] = (struct pass){.kind = CALIBRATE, .round = round};
     if (last && fit->bvh)
@@ -420,7 +424,7 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
     case STRANDS:
         random_search_strands(search, pass->active, fit->iteration, count, grid_of(fit, pass), HALVINGS, context);
         return GROOM_OK;
-    case STRAYS: return strays_settle(search, fit->iteration, count, context, diag);
+    case STRAYS: return strays_settle(search, fit->iteration, count, !pass->last, context, diag);
     case CURLS: return search_curls(fit, search, pass, count, NULL, context, diag);
     case LAW: return restate_frequencies(fit, search, pass, context, diag);
     case POLISH:

@@ -145,14 +145,14 @@ static groom_status settle(struct strays *s, const struct groom_context *context
     return st;
 }
 
-groom_status strays_settle(struct random_search *search, uint32_t first, uint32_t count, const struct groom_context *context,
+groom_status strays_settle(struct random_search *search, uint32_t first, uint32_t count, int follow, const struct groom_context *context,
                            struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
     struct groom *groom = search->fit->groom;
     struct strays s = {.search = search, .groom = groom, .n = count};
     float usual = 0;
-    s.n_near = !moves_bundles(groom) ? 0 : NEAR < groom->n_operator_guides ? NEAR : groom->n_operator_guides;
+    s.n_near = !follow || !moves_bundles(groom) ? 0 : NEAR < groom->n_operator_guides ? NEAR : groom->n_operator_guides;
     s.strand = memory_array(allocator, count, sizeof *s.strand);
     s.near = memory_array(allocator, (size_t)count * s.n_near, sizeof *s.near);
     s.least = memory_array(allocator, count, sizeof *s.least);

@@ -11,9 +11,10 @@
  *
  * Of strands first .. first + count - 1, those that are several times as far off as the strand in the middle of all.
  * search   of the fit's groom
+ * follow   whether they look at other operator guides than their own
  * returns  GROOM_OK, GROOM_ENOMEM: nothing has changed
  * threads  same bits for any pool */
-GROOM_MUST_CHECK groom_status strays_settle(struct random_search *search, uint32_t first, uint32_t count,
+GROOM_MUST_CHECK groom_status strays_settle(struct random_search *search, uint32_t first, uint32_t count, int follow,
                                             const struct groom_context *context, struct groom_diag *diag);
 
 #endif

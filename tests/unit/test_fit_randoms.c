@@ -184,7 +184,18 @@ static double off_guides(const struct groom *a, const struct groom *b)
     return sqrt(sum / ((double)a->n_guides * a->n_vertices));
 }
 
-/* Guides of the truth, each turned and stretched a little, come back where numbers are the truth's. */
+/* Each turned and stretched a little. */
+static void spoil_guides(struct groom *groom)
+{
+    for (uint32_t g = 0; g < groom->n_guides; g++)
+        for (uint32_t j = 1; j < groom->n_vertices; j++) {
+            float *x = groom->guides[(size_t)g * groom->n_vertices + j], *root = groom->guides[(size_t)g * groom->n_vertices];
+            for (int c = 0; c < 3; c++)
+                x[c] += (x[c] - root[c]) * 0.02f * (float)((int)(g % 5) - 2) + 0.004f * (float)j / M * (float)((int)(g % 3) - 1);
+        }
+}
+
+/* Guides of the truth, spoilt, come back where numbers are the truth's. */
 static void come_back(groom_sample_style style, double share)
 {
     struct groom_sample *sample = guides_sample(style, 600, M, 3, NULL);
@@ -195,12 +206,7 @@ static void come_back(groom_sample_style style, double share)
             memcpy(groom->operators[o].random[r], sample->truth->operators[o].random[r],
                    (groom_operator_random_per_guide(groom->operators[o].type) ? groom->n_operator_guides : groom->n_strands) *
                        sizeof(float));
-    for (uint32_t g = 0; g < groom->n_guides; g++)
-        for (uint32_t j = 1; j < groom->n_vertices; j++) {
-            float *x = groom->guides[(size_t)g * groom->n_vertices + j], *root = groom->guides[(size_t)g * groom->n_vertices];
-            for (int c = 0; c < 3; c++)
-                x[c] += (x[c] - root[c]) * 0.02f * (float)((int)(g % 5) - 2) + 0.004f * (float)j / M * (float)((int)(g % 3) - 1);
-        }
+    spoil_guides(groom);
     double before = off_guides(groom, sample->truth);
     fit->options.stages.randoms.across = 1e-4;
     for (int step = 0; step < 3; step++)
@@ -213,6 +219,31 @@ static void come_back(groom_sample_style style, double share)
 
 START_TEST(guides_of_straight_hair_follow_known_numbers) { come_back(GROOM_SAMPLE_STRAIGHT, 0.15); } END_TEST
 START_TEST(guides_of_wavy_hair_follow_known_numbers) { come_back(GROOM_SAMPLE_WAVY, 0.2); } END_TEST
+
+static const float *frizz_of(const struct groom *groom)
+{
+    for (uint32_t o = 0; o < groom->n_operators; o++)
+        if (groom->operators[o].type == GROOM_OPERATOR_FRIZZ)
+            return groom->operators[o].random[0];
+    ck_abort_msg("no frizz");
+}
+
+START_TEST(few_places_in_the_noise_are_missed_where_guides_are_wrong)
+{
+    struct groom_context context = three_threads();
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_SHORT, 1000, 100, 3, &context);
+    struct groom_fit *fit = fit_of(sample, 2);
+    uint32_t n_lost = 0;
+    spoil_guides(fit->groom);
+    finish(fit, &context);
+    for (uint32_t i = 0; i < fit->n; i++)
+        n_lost += fabs((double)frizz_of(fit->groom)[i] - frizz_of(sample->truth)[i]) > 0.01;
+    ck_assert_msg(n_lost < 25, "%u of %u", n_lost, fit->n);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+    groom_pool_destroy(context.pool);
+}
+END_TEST
 
 static void same_grooms(const struct groom *a, const struct groom *b)
 {
@@ -541,6 +572,7 @@ TEST_SUITE("fit_randoms", the_error_is_none_on_the_same_curve_however_its_vertic
            the_error_has_the_same_bits_in_all_variants, the_losses_are_those_of_their_equation,
            numbers_of_bent_hair_are_found, numbers_of_spiky_hair_are_found, numbers_of_curls_are_found,
            guides_of_straight_hair_follow_known_numbers, guides_of_wavy_hair_follow_known_numbers,
+           few_places_in_the_noise_are_missed_where_guides_are_wrong,
            what_scales_have_in_common_goes_to_the_guides, frequencies_that_are_found_tell_their_law,
            what_halves_of_the_strands_do_not_agree_on_is_no_difference_of_curls, the_stage_has_the_same_bits_for_any_threads, the_stage_can_be_interrupted_anywhere,
            a_cancelled_step_changes_nothing,

@@ -74,7 +74,7 @@ static void settle_strays(struct groom_fit *fit)
     struct random_search search;
     ck_ok(random_search_init(&search, fit, NULL, NULL));
     search.weights = weights;
-    ck_ok(strays_settle(&search, 0, fit->n, NULL, NULL));
+    ck_ok(strays_settle(&search, 0, fit->n, 1, NULL, NULL));
     random_search_finish(&search);
 }
 
