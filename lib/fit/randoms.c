@@ -40,7 +40,7 @@
 #define SMOOTH_VALUES 24     /* of a number that the error is smooth in */
 #define HALVINGS 3           /* of the step around the best value: Newton's steps do the rest */
 #define STEP_WORK 1200000    /* strands times values of one step: about a second */
-#define PASSES_OF_ROUND (9 * GROOM_FIT_MAX_OPERATORS + 10) /* at most */
+#define PASSES_OF_ROUND (9 * GROOM_FIT_MAX_OPERATORS + 11) /* at most */
 #define MOST_PASSES (4 * PASSES_OF_ROUND)
 #define FEW_STRANDS 6        /* a guide: another round for curls; */
 #define SOME_STRANDS 16      /* another look at guides and curls */
@@ -194,6 +194,8 @@ static uint32_t list_round(const struct groom_fit *fit, uint32_t round, int last
     passes[n++] = (struct pass){.kind = POLISH, .round = round, .last = last};
     if (last) { /* with weights of their own, strands tell better what is wrong with their numbers */
         passes[n++] = (struct pass){.kind = STRAYS, .round = round, .last = 1};
+        if (!clumps(fit->groom)) /* longer guides of clumps move strands */
+            passes[n++] = (struct pass){.kind = CENTRE, .round = round};
         passes[n++] = (struct pass){.kind = POLISH, .round = round, .last = 1};
     }
     if (last && fit->options.stages.randoms.refinements > 0)
