@@ -39,6 +39,7 @@ enum phase { SOLVE, ASSIGN, ENDED };
 #define CURLS_UNKNOWN (2.0 / 3) /* of the waves along a guide, while it could take those of curls for its own */
 #define ROOT_PART 6            /* of so many of a guide, where it turns out of the scalp */
 #define LOOSEST 0.001          /* of the usual weight along it, there */
+#define WEIGHINGS 3             /* of roughness: what was smoothed away shows bit by bit */
 #define TIGHTEST 16.0          /* times the usual weight along it, where neighbours share nothing: two waves a guide, for three */
 #define FEW_STRANDS 8.0        /* of an operator guide tell little of where it stands */
 #define ROUNDS_AT_HEAD 2
@@ -60,6 +61,7 @@ struct solution {
     double (*move)[3];      /* [n_guides] of the roots, then */
     double (*line)[3];      /* [m] */
     struct roughness *roughness; /* [m] */
+    double along;           /* of the system, where nothing is known of roughness */
     double *partial;        /* of the loss */
     float (*direction)[3];  /* [n_guides] at the root, unit */
     float (*point)[3];      /* [n_guides * m] metres */
@@ -314,6 +316,8 @@ static void weigh_roughness(struct solution *solution)
     uint32_t m = solution->fit->m;
     if (m <= 2 * ROOT_PART)
         return;
+    for (uint32_t j = 0; j < m; j++)
+        solution->system.along[j] = solution->along;
     roughness_measure((const double (*)[3])solution->shape, m, &solution->laplacian, solution->roughness);
     loosen_roots(solution);
     tighten(solution);
@@ -429,8 +433,8 @@ static groom_status solution_init(struct solution *solution, struct groom_fit *f
         return st;
     st = guide_system_init(&solution->system, &solution->mean, &solution->laplacian, along_of(cycles, fit->m), across,
                            context, diag);
-    if (st == GROOM_OK && known)
-        weigh_roughness(solution);
+    if (st == GROOM_OK)
+        solution->along = solution->system.along[0];
     int clumps = solution->mean.n_parts > fit->groom->n_instancing;
     if (st == GROOM_OK && clumps)
         st = expect_roots(solution, known, context, diag);
@@ -480,12 +484,12 @@ static void exchange_guides(struct solution *solution)
         }
 }
 
-static groom_status solve_rounds(struct solution *solution, uint32_t rounds_at_head, const struct groom_context *context, struct groom_diag *diag)
+static groom_status solve_rounds(struct solution *solution, uint32_t rounds_at_head, double tolerance, const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_fit *fit = solution->fit;
     for (uint32_t round = 0; round <= rounds_at_head; round++) {
         return_moves(solution);
-        guide_system_solve(&solution->system, solution->shape, TOLERANCE, MOST_ITERATIONS, context);
+        guide_system_solve(&solution->system, solution->shape, tolerance, MOST_ITERATIONS, context);
         take_moves(solution);
         if (progress_cancelled(context))
             return cancelled(diag);
@@ -507,7 +511,7 @@ static groom_status solve(struct groom_fit *fit, const struct groom_context *con
     if (st != GROOM_OK)
         goto out;
     if ((st = loss_guides(fit, &before, context, diag)) != GROOM_OK ||
-        (st = solve_rounds(&solution, ROUNDS_AT_HEAD, context, diag)) != GROOM_OK)
+        (st = solve_rounds(&solution, ROUNDS_AT_HEAD, TOLERANCE, context, diag)) != GROOM_OK)
         goto out;
     fill_points(&solution);
     exchange_guides(&solution);
@@ -527,8 +531,11 @@ groom_status guides_refine(struct groom_fit *fit, const struct groom_context *co
 {
     struct solution solution;
     groom_status st = solution_init(&solution, fit, 1, fit->options.stages.randoms.across, context, diag);
-    if (st == GROOM_OK)
-        st = solve_rounds(&solution, ROUNDS_KNOWN, context, diag);
+    for (int weighing = 0; st == GROOM_OK && weighing < WEIGHINGS; weighing++) {
+        weigh_roughness(&solution);
+        st = weighing + 1 < WEIGHINGS ? solve_rounds(&solution, 0, TOLERANCE_CHOOSING, context, diag)
+                                      : solve_rounds(&solution, ROUNDS_KNOWN, TOLERANCE, context, diag);
+    }
     if (st == GROOM_OK) {
         fill_points(&solution);
         exchange_guides(&solution);

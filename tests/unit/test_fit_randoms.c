@@ -184,6 +184,16 @@ static double off_guides(const struct groom *a, const struct groom *b)
     return sqrt(sum / ((double)a->n_guides * a->n_vertices));
 }
 
+/* Those of the truth. */
+static void know_numbers(struct groom *groom, const struct groom *truth)
+{
+    for (uint32_t o = 0; o < groom->n_operators; o++)
+        for (uint32_t r = 0; r < groom_operator_random_arrays(groom->operators[o].type); r++)
+            memcpy(groom->operators[o].random[r], truth->operators[o].random[r],
+                   (groom_operator_random_per_guide(groom->operators[o].type) ? groom->n_operator_guides : groom->n_strands) *
+                       sizeof(float));
+}
+
 /* Each turned and stretched a little. */
 static void spoil_guides(struct groom *groom)
 {
@@ -201,11 +211,7 @@ static void come_back(groom_sample_style style, double share)
     struct groom_sample *sample = guides_sample(style, 600, M, 3, NULL);
     struct groom_fit *fit = fit_of(sample, 2);
     struct groom *groom = fit->groom;
-    for (uint32_t o = 0; o < groom->n_operators; o++)
-        for (uint32_t r = 0; r < groom_operator_random_arrays(groom->operators[o].type); r++)
-            memcpy(groom->operators[o].random[r], sample->truth->operators[o].random[r],
-                   (groom_operator_random_per_guide(groom->operators[o].type) ? groom->n_operator_guides : groom->n_strands) *
-                       sizeof(float));
+    know_numbers(groom, sample->truth);
     spoil_guides(groom);
     double before = off_guides(groom, sample->truth);
     fit->options.stages.randoms.across = 1e-4;
@@ -219,6 +225,44 @@ static void come_back(groom_sample_style style, double share)
 
 START_TEST(guides_of_straight_hair_follow_known_numbers) { come_back(GROOM_SAMPLE_STRAIGHT, 0.15); } END_TEST
 START_TEST(guides_of_wavy_hair_follow_known_numbers) { come_back(GROOM_SAMPLE_WAVY, 0.2); } END_TEST
+
+/* Radians that guides turn by on their first tenth, on average. */
+static double turn_at_roots(const struct groom *groom)
+{
+    uint32_t m = groom->n_vertices;
+    double sum = 0;
+    for (uint32_t g = 0; g < groom->n_guides; g++) {
+        const float (*x)[3] = (const float (*)[3])(groom->guides + (size_t)g * m);
+        double dot = 0, a = 0, b = 0;
+        for (int c = 0; c < 3; c++) {
+            double first = (double)x[1][c] - x[0][c], then = (double)x[m / 10][c] - x[m / 10 - 1][c];
+            dot += first * then, a += first * first, b += then * then;
+        }
+        sum += acos(fmin(dot / sqrt(a * b), 1)) / groom->n_guides;
+    }
+    return sum;
+}
+
+START_TEST(guides_turn_out_of_the_scalp_as_hair_does)
+{
+    struct groom_sample *sample = guides_sample(GROOM_SAMPLE_STRAIGHT, 600, 100, 3, NULL);
+    struct groom_fit *fit = fit_of(sample, 2);
+    uint32_t m = fit->m;
+    know_numbers(fit->groom, sample->truth);
+    for (uint32_t g = 0; g < fit->n_guides; g++) /* straight to begin with */
+        for (uint32_t j = 1; j < m / 8; j++)
+            for (int c = 0; c < 3; c++) {
+                float (*x)[3] = fit->groom->guides + (size_t)g * m;
+                x[j][c] = x[0][c] + (x[m / 8][c] - x[0][c]) * (float)j / (float)(m / 8);
+            }
+    double before = turn_at_roots(fit->groom), truth = turn_at_roots(sample->truth);
+    ck_ok(guides_refine(fit, NULL, NULL));
+    double after = turn_at_roots(fit->groom);
+    ck_assert_msg(fabs(after - truth) < 0.1 * truth, "%g of %g, straight %g", after, truth, before);
+    groom_fit_destroy(fit);
+    groom_sample_destroy(sample);
+}
+END_TEST
 
 static const float *frizz_of(const struct groom *groom)
 {
@@ -572,7 +616,7 @@ TEST_SUITE("fit_randoms", the_error_is_none_on_the_same_curve_however_its_vertic
            the_error_has_the_same_bits_in_all_variants, the_losses_are_those_of_their_equation,
            numbers_of_bent_hair_are_found, numbers_of_spiky_hair_are_found, numbers_of_curls_are_found,
            guides_of_straight_hair_follow_known_numbers, guides_of_wavy_hair_follow_known_numbers,
-           few_places_in_the_noise_are_missed_where_guides_are_wrong,
+           guides_turn_out_of_the_scalp_as_hair_does, few_places_in_the_noise_are_missed_where_guides_are_wrong,
            what_scales_have_in_common_goes_to_the_guides, frequencies_that_are_found_tell_their_law,
            what_halves_of_the_strands_do_not_agree_on_is_no_difference_of_curls, the_stage_has_the_same_bits_for_any_threads, the_stage_can_be_interrupted_anywhere,
            a_cancelled_step_changes_nothing,
