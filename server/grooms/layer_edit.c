@@ -17,12 +17,12 @@ static double now_s(void)
 
 /* --- the body --------------------------------------------------------------------------- */
 
-static groom_status refuse(struct trial *trial, const char *pointer, const char *what)
+static groom_status refuse(struct layer_trial *trial, const char *pointer, const char *what)
 {
     return groom_fail_field(trial->diag, GROOM_EINVAL, pointer, "%s", what);
 }
 
-static groom_status take_flag(struct trial *trial, const char *name, bool *value)
+static groom_status take_flag(struct layer_trial *trial, const char *name, bool *value)
 {
     char pointer[32];
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(trial->control, name);
@@ -33,7 +33,7 @@ static groom_status take_flag(struct trial *trial, const char *name, bool *value
     return GROOM_OK;
 }
 
-static groom_status take_number(struct trial *trial, const char *name, uint32_t *value)
+static groom_status take_number(struct layer_trial *trial, const char *name, uint32_t *value)
 {
     char pointer[32];
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(trial->control, name);
@@ -47,7 +47,7 @@ static groom_status take_number(struct trial *trial, const char *name, uint32_t 
     return GROOM_OK;
 }
 
-static groom_status take_text(struct trial *trial, const char *name, const char **value)
+static groom_status take_text(struct layer_trial *trial, const char *name, const char **value)
 {
     char pointer[32];
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(trial->control, name);
@@ -59,7 +59,7 @@ static groom_status take_text(struct trial *trial, const char *name, const char 
 }
 
 /* Which members are not the layer's. */
-static const char *control_members(const struct trial *trial)
+static const char *control_members(const struct layer_trial *trial)
 {
     static const char *const names[2][2] = {
         {" commit points avoid_head head ", " layer commit points avoid_head "},
@@ -67,7 +67,7 @@ static const char *control_members(const struct trial *trial)
     return names[trial->edit->type == GROOM_OPERATOR_INTERPOLATE][trial->edit->groom_id != NULL];
 }
 
-static void split_body(struct trial *trial)
+static void split_body(struct layer_trial *trial)
 {
     for (cJSON *item = trial->body->child, *next; item; item = next) {
         char word[48];
@@ -78,7 +78,7 @@ static void split_body(struct trial *trial)
     }
 }
 
-static groom_status parse_body(struct trial *trial)
+static groom_status parse_body(struct layer_trial *trial)
 {
     struct json_text_error error;
     groom_status status;
@@ -105,7 +105,7 @@ static groom_status parse_body(struct trial *trial)
 
 /* --- the layer ----------------------------------------------------------------------------- */
 
-static groom_status find_layer(struct trial *trial)
+static groom_status find_layer(struct layer_trial *trial)
 {
     const struct groom *groom = trial->subject.groom;
     trial->index = groom->n_operators;
@@ -123,7 +123,7 @@ static groom_status find_layer(struct trial *trial)
 }
 
 /* The node to read: what the layer was, with what the body changes; contact is found anew. */
-static cJSON *merge(struct trial *trial)
+static cJSON *merge(struct layer_trial *trial)
 {
     const cJSON *chain = cJSON_GetObjectItemCaseSensitive(trial->subject.edit.document, "operators");
     cJSON *node = trial->replaced ? cJSON_Duplicate(cJSON_GetArrayItem(chain, (int)trial->index), 1) : cJSON_CreateObject();
@@ -145,7 +145,7 @@ static cJSON *merge(struct trial *trial)
 }
 
 /* "/operators/5/anchors/0/at" of the chain is "/anchors/0/at" of the body. */
-static groom_status shorten(const struct trial *trial, groom_status status)
+static groom_status shorten(const struct layer_trial *trial, groom_status status)
 {
     char prefix[32];
     int n = snprintf(prefix, sizeof prefix, "/operators/%u", trial->index);
@@ -155,7 +155,7 @@ static groom_status shorten(const struct trial *trial, groom_status status)
     return status;
 }
 
-static groom_status read_layer(struct trial *trial)
+static groom_status read_layer(struct layer_trial *trial)
 {
     struct groom_array_finder finder = arrays_finder(&trial->subject.edit.arrays);
     groom_status status = find_layer(trial);
@@ -185,14 +185,14 @@ static groom_status read_layer(struct trial *trial)
 
 /* --- at work ------------------------------------------------------------------------------------- */
 
-static groom_status take_before(struct trial *trial)
+static groom_status take_before(struct layer_trial *trial)
 {
     return evaluate_state(trial->grooms, trial->subject.groom, trial->subject.keys, trial->index, &trial->before,
                           trial->diag);
 }
 
 /* What an earlier try has kept, where it still serves. */
-static groom_status take_input(struct trial *trial)
+static groom_status take_input(struct layer_trial *trial)
 {
     struct states *states = trial->grooms->states;
     trial->input = states_take_input(states, trial->before);
@@ -204,7 +204,7 @@ static groom_status take_input(struct trial *trial)
                                     &trial->input, trial->diag);
 }
 
-static groom_status take_head(struct trial *trial)
+static groom_status take_head(struct layer_trial *trial)
 {
     if (!trial->wish.avoid_head || !*trial->subject.head ||
         project_has(trial->grooms, trial->edit->project, trial->subject.head, NULL) != GROOM_OK)
@@ -212,7 +212,7 @@ static groom_status take_head(struct trial *trial)
     return heads_acquire(trial->grooms, trial->subject.head, &trial->head, trial->diag);
 }
 
-static groom_status apply(struct trial *trial)
+static groom_status apply(struct layer_trial *trial)
 {
     groom_status status = take_input(trial);
     if (status == GROOM_OK)
@@ -229,7 +229,7 @@ static groom_status apply(struct trial *trial)
 }
 
 /* The strands behind the layer stay where an export finds them. */
-static groom_status keep_after(struct trial *trial, const char *node)
+static groom_status keep_after(struct layer_trial *trial, const char *node)
 {
     char key[STORE_HASH_SIZE];
     struct state *state;
@@ -245,7 +245,7 @@ static groom_status keep_after(struct trial *trial, const char *node)
     return GROOM_OK; /* what could not be kept is computed again */
 }
 
-static groom_status answer(struct trial *trial, struct grooms_layer_edited *edited)
+static groom_status answer(struct layer_trial *trial, struct grooms_layer_edited *edited)
 {
     uint32_t n = trial->report.n_strands;
     const uint32_t *strands = trial->input ? groom_layer_input_strands(trial->input, &n) : NULL;
@@ -266,7 +266,7 @@ static groom_status answer(struct trial *trial, struct grooms_layer_edited *edit
     return edited->json ? GROOM_OK : groom_fail(trial->diag, GROOM_ENOMEM, "no memory for the answer");
 }
 
-groom_status trial_finish(struct trial *trial, trial_store store, void *user, struct grooms_layer_edited *edited)
+groom_status layer_trial_finish(struct layer_trial *trial, layer_trial_store store, void *user, struct grooms_layer_edited *edited)
 {
     struct written written = {0};
     groom_status status = GROOM_OK;
@@ -296,7 +296,7 @@ groom_status trial_finish(struct trial *trial, trial_store store, void *user, st
 /* --- too many for one request -------------------------------------------------------------------------------- */
 
 /* What a job is to be given: the body as it came, and what it is for, at this revision. */
-static groom_status hand_over(struct trial *trial, struct grooms_layer_edited *edited)
+static groom_status hand_over(struct layer_trial *trial, struct grooms_layer_edited *edited)
 {
     cJSON *inputs = cJSON_CreateObject();
     if (!trial->wish.commit) {
@@ -322,7 +322,7 @@ static groom_status hand_over(struct trial *trial, struct grooms_layer_edited *e
 
 /* --- the edit ------------------------------------------------------------------------------------------ */
 
-void trial_end(struct trial *trial)
+void layer_trial_end(struct layer_trial *trial)
 {
     if (trial->before && trial->input)
         states_give_input(trial->grooms->states, trial->before, trial->input);
@@ -336,7 +336,7 @@ void trial_end(struct trial *trial)
     cJSON_Delete(trial->control);
 }
 
-groom_status trial_begin(struct trial *trial)
+groom_status layer_trial_begin(struct layer_trial *trial)
 {
     groom_status status;
     trial->started_s = now_s();
@@ -350,16 +350,16 @@ groom_status trial_begin(struct trial *trial)
 static groom_status store_now(void *user, const struct store_revision_new *next, uint32_t expected, const char *answer,
                               struct groom_diag *diag)
 {
-    struct trial *trial = user;
+    struct layer_trial *trial = user;
     (void)answer;
     return expected ? store_revision_add(trial->grooms->options.store, next, expected, diag)
                     : store_groom_create(trial->grooms->options.store, next, diag);
 }
 
-static groom_status run(struct trial *trial, struct grooms_layer_edited *edited)
+static groom_status run(struct layer_trial *trial, struct grooms_layer_edited *edited)
 {
     uint32_t n = 0;
-    groom_status status = trial_begin(trial);
+    groom_status status = layer_trial_begin(trial);
     if (status != GROOM_OK)
         return status;
     status = groom_layer_count(&trial->work, trial->index, trial->before->strands, &trial->grooms->context, &n, trial->diag);
@@ -369,16 +369,16 @@ static groom_status run(struct trial *trial, struct grooms_layer_edited *edited)
     if (n > GROOMS_EDIT_MOST_NOW)
         return hand_over(trial, edited);
     status = apply(trial);
-    return status == GROOM_OK ? trial_finish(trial, store_now, trial, edited) : status;
+    return status == GROOM_OK ? layer_trial_finish(trial, store_now, trial, edited) : status;
 }
 
 groom_status grooms_edit_layer(struct grooms *grooms, const struct grooms_layer_edit *edit,
                                struct grooms_layer_edited *out, struct groom_diag *diag)
 {
-    struct trial trial = {.grooms = grooms, .edit = edit, .diag = diag};
+    struct layer_trial trial = {.grooms = grooms, .edit = edit, .diag = diag};
     struct grooms_layer_edited edited = {0};
     groom_status status = run(&trial, &edited);
-    trial_end(&trial);
+    layer_trial_end(&trial);
     if (status == GROOM_OK)
         *out = edited;
     else

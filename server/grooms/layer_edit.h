@@ -70,7 +70,7 @@ char *layer_answer_text(const struct layer_answer *answer);
 /* --- one edit (layer_edit.c) ------------------------------------------------------------- */
 
 /* One under way. */
-struct trial {
+struct layer_trial {
     struct grooms *grooms;
     const struct grooms_layer_edit *edit;
     struct groom_diag *diag;
@@ -91,13 +91,13 @@ struct trial {
 };
 
 /* Read the body, open what it edits, read the layer, and have the strands that come into it. */
-groom_status trial_begin(struct trial *trial);
-void trial_end(struct trial *trial); /* also where trial_begin has failed */
+groom_status layer_trial_begin(struct layer_trial *trial);
+void layer_trial_end(struct layer_trial *trial); /* also where layer_trial_begin has failed */
 
 /* How a revision is stored: now, or with the end of a job. */
-typedef groom_status (*trial_store)(void *user, const struct store_revision_new *next, uint32_t expected,
-                                    const char *answer, struct groom_diag *diag);
+typedef groom_status (*layer_trial_store)(void *user, const struct store_revision_new *next, uint32_t expected,
+                                          const char *answer, struct groom_diag *diag);
 /* With `after` and `report` in the trial. */
-groom_status trial_finish(struct trial *trial, trial_store store, void *user, struct grooms_layer_edited *edited);
+groom_status layer_trial_finish(struct layer_trial *trial, layer_trial_store store, void *user, struct grooms_layer_edited *edited);
 
 #endif

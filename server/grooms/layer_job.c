@@ -12,7 +12,7 @@
 struct reopened {
     cJSON *inputs;
     struct grooms_layer_edit edit;
-    struct trial trial;
+    struct layer_trial trial;
 };
 
 static groom_status reopen(struct grooms *grooms, const struct grooms_layer_job *job, struct groom_diag *diag,
@@ -27,12 +27,12 @@ static groom_status reopen(struct grooms *grooms, const struct grooms_layer_job 
     r->edit.project = job->project;
     r->edit.body = job->options;
     r->edit.n_body = strlen(job->options);
-    r->trial = (struct trial){.grooms = grooms, .edit = &r->edit, .diag = diag, .contact = contact};
+    r->trial = (struct layer_trial){.grooms = grooms, .edit = &r->edit, .diag = diag, .contact = contact};
     if (!r->edit.groom_id && !r->edit.strands_id)
         return groom_fail(diag, GROOM_EINVAL, "the job does not say what is edited");
     groom_status status = groom_operator_parse(job->kind, &r->edit.type, diag);
     if (status == GROOM_OK)
-        status = trial_begin(&r->trial);
+        status = layer_trial_begin(&r->trial);
     if (status == GROOM_ECONFLICT) /* to a worker that word means that another has taken its place */
         return groom_fail(diag, GROOM_EINVAL, "the groom was changed while its edit waited: repeat the edit");
     return status;
@@ -40,14 +40,14 @@ static groom_status reopen(struct grooms *grooms, const struct grooms_layer_job 
 
 static void close_again(struct reopened *r)
 {
-    trial_end(&r->trial);
+    layer_trial_end(&r->trial);
     cJSON_Delete(r->inputs);
 }
 
 /* --- what the worker is given ---------------------------------------------------------------- */
 
 /* A groom of strands alone has no operator guides: who belongs to which is told. */
-static groom_status tell_groups(struct trial *trial)
+static groom_status tell_groups(struct layer_trial *trial)
 {
     const struct groom *groom = &trial->work;
     struct groom_grouping *grouping = &groom->operators[trial->index].layer->grouping;
@@ -128,7 +128,7 @@ static void read_report(const cJSON *json, struct groom_layer_report *r)
 
 static int make_room(void *user, struct strand_stream *stream)
 {
-    struct trial *trial = user;
+    struct layer_trial *trial = user;
     const struct groom_strands *before = trial->before->strands;
     if (stream->n_strands != before->n_strands || stream->n_vertices != before->n_vertices ||
         groom_strands_create(stream->n_strands, stream->n_vertices, &trial->grooms->context, &trial->after, NULL) != GROOM_OK)
@@ -146,7 +146,7 @@ static int are_finite(const struct groom_strands *strands)
     return 1;
 }
 
-static groom_status read_strands(struct trial *trial, const char *bytes, size_t n_bytes)
+static groom_status read_strands(struct layer_trial *trial, const char *bytes, size_t n_bytes)
 {
     struct strand_stream stream = {.room = make_room, .user = trial};
     const struct groom_strands *before = trial->before->strands;
@@ -178,7 +178,7 @@ groom_status grooms_job_result(struct grooms *grooms, const struct grooms_layer_
         read_report(report, &r.trial.report);
         r.trial.wish.points = false;
         r.trial.started_s -= number(report, "seconds");
-        status = trial_finish(&r.trial, store, user, &edited);
+        status = layer_trial_finish(&r.trial, store, user, &edited);
     }
     grooms_layer_edited_finish(&edited);
     close_again(&r);
