@@ -74,7 +74,7 @@ static void add_valley(struct valleys *valleys, int l, float value, float error)
 /* Over the whole range, values that are better than both of their neighbours; and the present one. */
 static void look_around(const struct strands_job *job, struct random_search_memory *memory, float step, struct valleys *valleys)
 {
-    lanes value, error, last = {0}, falls = {0};
+    lanes value, error = {0}, last = {0}, falls = {0};
     memcpy(value, memory->in[job->active].random[0], sizeof value);
     for (int v = 0; v < VALLEYS; v++)
         for (int l = 0; l < LANES; l++)
