@@ -34,12 +34,12 @@ enum phase { SOLVE, ASSIGN, ENDED };
 #define MOST_ITERATIONS 300
 #define USUAL_ACROSS 4.0        /* where strands cannot tell */
 #define HELD 5                  /* one strand of so many is foretold */
-#define TOLERANCE_CHOOSING 1e-3
+#define TOLERANCE_CHOOSING 1e-3 /* where it only shows what weights do: the solution comes after */
 #define ITERATIONS_CHOOSING 40
 #define CURLS_UNKNOWN (2.0 / 3) /* of the waves along a guide, while it could take those of curls for its own */
 #define ROOT_PART 6            /* of so many of a guide, where it turns out of the scalp */
 #define LOOSEST 0.001          /* of the usual weight along it, there */
-#define WEIGHINGS 3             /* of roughness: what was smoothed away shows bit by bit */
+#define WEIGHINGS 3            /* of roughness: what was smoothed away shows bit by bit */
 #define TIGHTEST 16.0          /* times the usual weight along it, where neighbours share nothing: two waves a guide, for three */
 #define FEW_STRANDS 8.0        /* of an operator guide tell little of where it stands */
 #define ROUNDS_AT_HEAD 2
