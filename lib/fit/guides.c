@@ -46,7 +46,8 @@ enum phase { SOLVE, ASSIGN, ENDED };
 #define ROUNDS_KNOWN 1          /* of guides that were out of the head already */
 #define HOLD_ROOT_EXPECTED 0.1 /* of an operator guide at its likeliest place, over the weight of its strands' vertices; */
 #define HOLD_ROOT_KNOWN 0.03   /* where it was found so far, where random numbers are known, and scatter less; */
-#define HOLD_ROOT_THERE 0.003  /* then, at its likeliest place */
+#define HOLD_ROOT_THERE 0.8    /* then, at its likeliest place, over the weight of one strand's, by the root of their number: the more
+                                * strands it has, the farther are the borders that tell that place */
 #define HOLD 1.0      /* of a vertex at the head, over the weight of a guide's strands */
 #define ASKED 8       /* strands of a guide that are asked whether they are in the head */
 #define FARTHEST 100.0 /* vertex from its root, over the size of the hair */
@@ -156,8 +157,9 @@ static groom_status expect_roots(struct solution *solution, int known, const str
     groom_status st = sites_find(fit, fit->groom->operator_guide_of, fit->groom->n_operator_guides, site, context, diag);
     for (uint32_t o = 0; st == GROOM_OK && o < fit->groom->n_operator_guides; o++) {
         size_t root = (size_t)fit->groom->operator_guide[o] * fit->m;
-        double all = (site[o].n + FEW_STRANDS) * fit->m;
-        double here = known ? HOLD_ROOT_KNOWN * all : 0, there = (known ? HOLD_ROOT_THERE : HOLD_ROOT_EXPECTED) * all;
+        double strands = site[o].n + FEW_STRANDS, all = strands * fit->m;
+        double here = known ? HOLD_ROOT_KNOWN * all : 0;
+        double there = known ? HOLD_ROOT_THERE * fit->m / sqrt(strands) : HOLD_ROOT_EXPECTED * all;
         solution->system.hold[root] = here + there;
         for (int c = 0; site[o].n > 0 && c < 3; c++)
             solution->system.pull[root][c] += there * (site[o].at[c] - (double)fit->groom->guides[root][c]) / (double)fit->scale;
