@@ -22,6 +22,7 @@
 #include "base/progress.h"
 #include "fit/align.h"
 #include "fit/calibrate.h"
+#include "fit/centre.h"
 #include "fit/follow.h"
 #include "fit/frequencies.h"
 #include "fit/gather.h"
@@ -58,7 +59,7 @@
 /* What is looked for: which operator guide each strand follows, the numbers of strands in one operator, both at once of
  * strands that are far off, the numbers of operator guides, what the strands of these are long, the law that these
  * follow, the axes that all lean on, the last digits of all that a strand has, which bundles are two, what numbers tell of
- * how long guides are, the guides that go with them, or these and the operators' parameters for them; at the end, how strong frizz is for all that
+ * guides, the guides that go with them, or these and the operators' parameters for them; at the end, how strong frizz is for all that
  * was found, and what is in the head. */
 struct pass {
     enum { FOLLOW, STRANDS, STRAYS, CURLS, LENGTHS, LAW, ALIGN, POLISH, REGROUP, CENTRE, GUIDES, RESHAPE, CALIBRATE, CLEAR } kind;
@@ -66,7 +67,7 @@ struct pass {
     uint32_t op, active; /* of STRANDS, CURLS, LENGTHS and LAW: its index in the chain, and among those that are enabled */
     enum { AROUND, WHOLE, BEYOND } look; /* of CURLS and LAW: around what was found, at the whole range, or at more
                                           * frequencies than there may be, for the law to begin with */
-    int last; /* of POLISH and STRAYS: guides and whom strands follow are what they will be */
+    int last; /* of POLISH, STRAYS and CENTRE: guides and whom strands follow are what they will be */
 };
 
 static int has_effect(const struct groom_operator *op)
@@ -195,7 +196,7 @@ static uint32_t list_round(const struct groom_fit *fit, uint32_t round, int last
     if (last) { /* with weights of their own, strands tell better what is wrong with their numbers */
         passes[n++] = (struct pass){.kind = STRAYS, .round = round, .last = 1};
         if (!clumps(fit->groom)) /* longer guides of clumps move strands */
-            passes[n++] = (struct pass){.kind = CENTRE, .round = round};
+            passes[n++] = (struct pass){.kind = CENTRE, .round = round, .last = 1};
         passes[n++] = (struct pass){.kind = POLISH, .round = round, .last = 1};
     }
     if (last && fit->options.stages.randoms.refinements > 0)
@@ -446,34 +447,14 @@ static groom_status search_pass(struct groom_fit *fit, struct random_search *sea
     return GROOM_EINTERNAL;
 }
 
-/* A scale is 1 on average: what the numbers found have in common is the guides' length. */
-static void centre_scale(struct groom *groom, struct groom_operator *op)
+/* Guides are solved after this, but for the last time. */
+static groom_status centre_step(struct groom_fit *fit, const struct pass *pass, const struct groom_context *context,
+                                struct groom_diag *diag)
 {
-    double sum = 0, random_scale = op->parameter[0];
-    for (uint32_t i = 0; i < groom->n_strands; i++)
-        sum += 1 + random_scale * op->random[0][i];
-    double common = sum / groom->n_strands;
-    if (!(common > 0))
-        return;
-    for (uint32_t i = 0; i < groom->n_strands; i++) {
-        double number = ((1 + random_scale * op->random[0][i]) / common - 1) / random_scale;
-        op->random[0][i] = (float)fmin(fmax(number, -1), 1);
-    }
-    for (uint32_t g = 0; g < groom->n_guides; g++) {
-        float (*x)[3] = groom->guides + (size_t)g * groom->n_vertices;
-        for (uint32_t j = 1; j < groom->n_vertices; j++)
-            for (int c = 0; c < 3; c++)
-                x[j][c] = (float)(x[0][c] + common * ((double)x[j][c] - x[0][c]));
-    }
-}
-
-static groom_status centre_step(struct groom_fit *fit)
-{
-    struct groom *groom = fit->groom;
-    for (uint32_t o = 0; o < groom->n_operators; o++)
-        if (groom->operators[o].type == GROOM_OPERATOR_SCALE && has_effect(&groom->operators[o]))
-            centre_scale(groom, &groom->operators[o]);
-    return GROOM_OK;
+    groom_status st = pass->last ? GROOM_OK : centre_bundles(fit->groom, memory_allocator(context), diag);
+    if (st == GROOM_OK)
+        centre_scales(fit->groom);
+    return st;
 }
 
 static groom_status lengths_step(struct groom_fit *fit, const struct pass *pass, const struct groom_context *context,
@@ -528,7 +509,7 @@ static groom_status pass_step(struct groom_fit *fit, const struct pass *pass, co
                               struct groom_diag *diag)
 {
     uint32_t count = step_size(fit, pass);
-    groom_status st = pass->kind == CENTRE      ? centre_step(fit)
+    groom_status st = pass->kind == CENTRE      ? centre_step(fit, pass, context, diag)
                       : pass->kind == REGROUP   ? regroup(fit, weights_of(fit, pass), context, diag)
                       : pass->kind == ALIGN     ? align_axes(fit, context, diag)
                       : pass->kind == LENGTHS   ? lengths_step(fit, pass, context, diag)
