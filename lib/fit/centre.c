@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "base/memory.h"
+#include "fit/draws.h"
 
 enum { RANDOM_SCALE = 0 }; /* of a scale's parameters */
 
@@ -10,8 +11,6 @@ static int is_centred(const struct groom_operator *op)
 {
     return op->enabled && op->parameter[0] != 0 && (op->type == GROOM_OPERATOR_SCALE || op->type == GROOM_OPERATOR_BEND);
 }
-
-static float in_range(double number) { return (float)fmin(fmax(number, -1), 1); }
 
 /* --- all strands --------------------------------------------------------------------------------- */
 
@@ -34,7 +33,7 @@ static void centre_scale(struct groom *groom, struct groom_operator *op)
     if (!(common > 0))
         return;
     for (uint32_t i = 0; i < groom->n_strands; i++)
-        op->random[0][i] = in_range(((1 + random_scale * (double)op->random[0][i]) / common - 1) / random_scale);
+        op->random[0][i] = draws_in_range(((1 + random_scale * (double)op->random[0][i]) / common - 1) / random_scale);
     stretch_guides(groom, common);
 }
 
@@ -47,12 +46,10 @@ void centre_scales(struct groom *groom)
 
 /* --- bundles --------------------------------------------------------------------------------------- */
 
-struct bundle { double n, mean; }; /* strands, and their numbers */
-
-static void measure(const struct groom *groom, const float *number, struct bundle *bundle)
+static void measure(const struct groom *groom, const float *number, struct bundle_mean *bundle)
 {
     for (uint32_t o = 0; o < groom->n_operator_guides; o++)
-        bundle[o] = (struct bundle){0};
+        bundle[o] = (struct bundle_mean){0};
     for (uint32_t i = 0; i < groom->n_strands; i++) {
         bundle[groom->operator_guide_of[i]].n++;
         bundle[groom->operator_guide_of[i]].mean += (double)number[i];
@@ -62,7 +59,7 @@ static void measure(const struct groom *groom, const float *number, struct bundl
 }
 
 /* The variance of numbers around their bundles' means. */
-static double variance_within(const struct groom *groom, const float *number, const struct bundle *bundle)
+static double variance_within(const struct groom *groom, const float *number, const struct bundle_mean *bundle)
 {
     double sum = 0, degrees = groom->n_strands;
     for (uint32_t i = 0; i < groom->n_strands; i++) {
@@ -74,32 +71,20 @@ static double variance_within(const struct groom *groom, const float *number, co
     return degrees > 0 ? sum / degrees : 0;
 }
 
-/* The variance of bundles' means beyond that of means of draws. */
-static double variance_of_bundles(const struct bundle *bundle, uint32_t n_bundles, double within)
-{
-    double sum = 0, told = 0;
-    for (uint32_t o = 0; o < n_bundles; o++)
-        if (bundle[o].n > 0) {
-            sum += bundle[o].mean * bundle[o].mean - within / bundle[o].n;
-            told++;
-        }
-    return told > 0 ? fmax(sum / told, 0) : 0;
-}
-
-static void centre_numbers(const struct groom *groom, float *number, struct bundle *bundle)
+static void centre_numbers(const struct groom *groom, float *number, struct bundle_mean *bundle)
 {
     measure(groom, number, bundle);
     double within = variance_within(groom, number, bundle);
-    double excess = variance_of_bundles(bundle, groom->n_operator_guides, within);
+    double excess = draws_excess(bundle, groom->n_operator_guides, 0, within);
     for (uint32_t i = 0; excess > 0 && i < groom->n_strands; i++) {
-        const struct bundle *own = &bundle[groom->operator_guide_of[i]];
-        number[i] = in_range((double)number[i] - own->mean * excess / (excess + within / own->n));
+        const struct bundle_mean *own = &bundle[groom->operator_guide_of[i]];
+        number[i] = draws_in_range((double)number[i] - own->mean * excess / (excess + within / own->n));
     }
 }
 
 groom_status centre_bundles(struct groom *groom, const struct groom_allocator *allocator, struct groom_diag *diag)
 {
-    struct bundle *bundle = memory_array(allocator, groom->n_operator_guides, sizeof *bundle);
+    struct bundle_mean *bundle = memory_array(allocator, groom->n_operator_guides, sizeof *bundle);
     if (!bundle)
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the numbers of %u bundles", groom->n_operator_guides);
     for (uint32_t o = 0; o < groom->n_operators; o++)

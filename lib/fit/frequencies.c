@@ -4,12 +4,12 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "fit/draws.h"
 #include "fit/spread.h"
 #include "groom/strands.h"
 
 enum { FREQUENCY = 1, RANDOM_FREQUENCY }; /* of a curl's parameters */
 
-#define TRUNCATED_DEVIATION 0.5396 /* of N(0,1) truncated to [-1,1] */
 #define LEAST_GUIDES 12         /* that tell a law */
 #define LEAST_STRANDS 2         /* of an operator guide that counts */
 #define WIDER 1.1               /* than the law is looked for in */
@@ -130,7 +130,7 @@ static struct spread_law middle_of(const struct groom *groom, const struct groom
         if (count[o] >= LEAST_STRANDS)
             counted[n++] = (struct counted){curl->random[0][o], count[o]};
     double low = quantile(counted, n, MIDDLE_FROM), high = quantile(counted, n, 1 - MIDDLE_FROM);
-    double deviation = ROUGHLY_WIDER * TRUNCATED_DEVIATION * (high - low) / MIDDLE_WIDTH;
+    double deviation = ROUGHLY_WIDER * DRAWS_DEVIATION * (high - low) / MIDDLE_WIDTH;
     return (struct spread_law){0.5 * (low + high), deviation * deviation, 0};
 }
 
@@ -166,7 +166,7 @@ static void apply_law(struct groom *groom, struct groom_operator *curl, const st
 {
     double frequency = curl->parameter[FREQUENCY], random = curl->parameter[RANDOM_FREQUENCY];
     double centre = fmax(frequency + random * law->mean, 0);
-    double spread = fmax(random * sqrt(law->variance) / TRUNCATED_DEVIATION, LEAST_SPREAD * centre);
+    double spread = fmax(random * sqrt(law->variance) / DRAWS_DEVIATION, LEAST_SPREAD * centre);
     curl->parameter[FREQUENCY] = (float)centre;
     curl->parameter[RANDOM_FREQUENCY] = (float)spread;
     for (uint32_t o = 0; o < groom->n_operator_guides; o++) {

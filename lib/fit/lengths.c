@@ -3,15 +3,11 @@
 #include <math.h>
 
 #include "base/memory.h"
+#include "fit/draws.h"
 
 enum { RANDOM_SCALE = 0 };              /* of a scale's parameters, */
 enum { FREQUENCY = 1, RANDOM_FREQUENCY }; /* of a curl's */
 
-#define TRUNCATED_DEVIATION 0.5396 /* of N(0,1) truncated to [-1,1] */
-
-struct bundle { double n, mean; }; /* strands, and what they are scaled by */
-
-static float in_range(double number) { return (float)fmin(fmax(number, -1), 1); }
 
 static double scale_of(const struct groom_operator *scale, uint32_t strand)
 {
@@ -24,7 +20,7 @@ static double frequency_of(const struct groom_operator *curl, uint32_t guide)
 }
 
 /* Means over bundles, as parts of the mean over all strands. */
-static void measure(const struct groom *groom, const struct groom_operator *scale, struct bundle *bundle)
+static void measure(const struct groom *groom, const struct groom_operator *scale, struct bundle_mean *bundle)
 {
     double sum = 0;
     for (uint32_t i = 0; i < groom->n_strands; i++) {
@@ -36,18 +32,6 @@ static void measure(const struct groom *groom, const struct groom_operator *scal
         bundle[o].mean = bundle[o].n > 0 && sum > 0 ? bundle[o].mean / bundle[o].n * (groom->n_strands / sum) : 1;
 }
 
-/* The variance of bundles' means beyond that of means of draws, whose own is `drawn` over the strands. */
-static double excess_of(const struct bundle *bundle, uint32_t n_bundles, double drawn)
-{
-    double sum = 0, told = 0;
-    for (uint32_t o = 0; o < n_bundles; o++)
-        if (bundle[o].n > 0) {
-            sum += (bundle[o].mean - 1) * (bundle[o].mean - 1) - drawn / bundle[o].n;
-            told++;
-        }
-    return told > 0 ? fmax(sum / told, 0) : 0;
-}
-
 /* Frequencies `ratio` times what they were, as far as their range lets them; ratio becomes what it was. */
 static void move_frequency(struct groom_operator *curl, uint32_t guide, double *ratio)
 {
@@ -55,7 +39,7 @@ static void move_frequency(struct groom_operator *curl, uint32_t guide, double *
     *ratio = random > 0 && was > 0 ? *ratio : 1;
     if (*ratio == 1)
         return;
-    curl->random[0][guide] = in_range((was * *ratio - (double)curl->parameter[FREQUENCY]) / random);
+    curl->random[0][guide] = draws_in_range((was * *ratio - (double)curl->parameter[FREQUENCY]) / random);
     *ratio = frequency_of(curl, guide) / was;
 }
 
@@ -63,19 +47,19 @@ groom_status lengths_settle(struct groom *groom, struct groom_operator *curl, st
                             const struct groom_allocator *allocator, struct groom_diag *diag)
 {
     uint32_t n = groom->n_operator_guides;
-    double eta = (double)scale->parameter[RANDOM_SCALE], drawn = pow(eta * TRUNCATED_DEVIATION, 2);
-    struct bundle *bundle = memory_array_zero(allocator, n, sizeof *bundle);
+    double eta = (double)scale->parameter[RANDOM_SCALE], drawn = pow(eta * DRAWS_DEVIATION, 2);
+    struct bundle_mean *bundle = memory_array_zero(allocator, n, sizeof *bundle);
     if (!bundle)
         return groom_fail(diag, GROOM_ENOMEM, "no memory for the lengths of %u curls", n);
     measure(groom, scale, bundle);
-    double excess = excess_of(bundle, n, drawn);
+    double excess = draws_excess(bundle, n, 1, drawn);
     for (uint32_t o = 0; o < n; o++) { /* from here on `mean` is what strands are shortened by */
         double error = bundle[o].n > 0 && excess > 0 ? excess / (excess + drawn / bundle[o].n) : 0;
         bundle[o].mean = 1 + error * (bundle[o].mean - 1);
         move_frequency(curl, o, &bundle[o].mean);
     }
     for (uint32_t i = 0; i < groom->n_strands && eta > 0; i++)
-        scale->random[0][i] = in_range((scale_of(scale, i) / bundle[groom->operator_guide_of[i]].mean - 1) / eta);
+        scale->random[0][i] = draws_in_range((scale_of(scale, i) / bundle[groom->operator_guide_of[i]].mean - 1) / eta);
     memory_release(allocator, bundle, n, sizeof *bundle);
     return GROOM_OK;
 }

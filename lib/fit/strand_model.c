@@ -3,7 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#define TRUNCATED_DEVIATION 0.5396     /* of N(0,1) truncated to [-1,1] */
+#include "fit/draws.h"
+
 #define CIRCLE_DEVIATION 0.7071067812  /* of a coordinate of a point on the unit circle */
 #define COMMON_SCALE 0.3               /* random scale, */
 #define COMMON_BEND 0.8                /* angle, and */
@@ -30,7 +31,7 @@ static void look_at(struct strand_model *model, const struct groom_operator *op)
 {
     switch (op->type) {
     case GROOM_OPERATOR_SCALE:
-        model->scale = TRUNCATED_DEVIATION * fmax(op->parameter[0], COMMON_SCALE);
+        model->scale = DRAWS_DEVIATION * fmax(op->parameter[0], COMMON_SCALE);
         break;
     case GROOM_OPERATOR_BEND:
         model->bend = CIRCLE_DEVIATION * fmax(op->parameter[0], COMMON_BEND);
