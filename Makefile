@@ -105,7 +105,7 @@ $(PARTS_A): $(call objects,$(filter-out $(MAINS),$(DAEMON_SOURCES) $(WORKER_SOUR
 # same order (no contraction): a strand's numbers are the same bits in the page and in the daemon.
 # Documents are taken apart by engine.mjs. It is linked without -O: with it clang hands what it has linked to wasm-opt
 # where that is installed, which refuses vectors that it was not told of. Random123 asks for a processor that it knows; any will do.
-ENGINE_SOURCES = $(addprefix lib/base/,diag.c memory.c pool_serial.c random.c status.c) \
+ENGINE_SOURCES = $(addprefix lib/base/,diag.c memory.c pool_serial.c random.c sort.c status.c) \
                  $(filter-out lib/model/document_%,$(call find_c,lib/model)) lib/strands/strands.c lib/render/light.c \
                  client/web/engine/engine.c
 ENGINE_FLAGS   = --target=wasm32-wasi -std=c11 -D_GNU_SOURCE -O3 -msimd128 -ffp-contract=off -fno-math-errno \

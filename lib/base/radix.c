@@ -1,5 +1,5 @@
 /* Radix sort by digits of 11 bits. */
-#include "quality/sort.h"
+#include "base/radix.h"
 
 #include <string.h>
 
@@ -7,7 +7,7 @@
 static uint32_t key_of(uint32_t bits) { return bits ^ (bits >> 31 ? 0xffffffffu : 0x80000000u); }
 static uint32_t bits_of_key(uint32_t key) { return key ^ (key >> 31 ? 0x80000000u : 0xffffffffu); }
 
-void sort_floats(float *values, float *spare, uint32_t n)
+void radix_sort_floats(float *values, float *spare, uint32_t n)
 {
     uint32_t *from = (uint32_t *)(void *)values, *to = (uint32_t *)(void *)spare;
     for (uint32_t i = 0; i < n; i++) {
@@ -44,7 +44,7 @@ static void order_pass(const uint64_t *from, uint64_t *to, uint32_t n, int shift
         to[first[from[i] >> (32 + shift) & 2047]++] = from[i];
 }
 
-void sort_order(const float *values, uint64_t *order, uint64_t *spare, uint32_t n)
+void radix_sort_order(const float *values, uint64_t *order, uint64_t *spare, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++) {
         uint32_t bits;

@@ -5,6 +5,7 @@
 
 #include "base/json_stream.h"
 #include "base/memory.h"
+#include "base/sort.h"
 #include "groom/analysis.h"
 
 /* --- what all answers begin with ------------------------------------------------------------ */
@@ -21,15 +22,9 @@ static uint32_t strand_name(const struct groom_analysis_telling *t, uint32_t i) 
 
 /* --- how well the super-helices meet the strands ----------------------------------------------- */
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 static float middle_of(float *numbers, uint32_t n)
 {
-    qsort(numbers, n, sizeof *numbers, compare_floats);
+    sort_floats(numbers, n);
     return n ? numbers[(n - 1) / 2] : 0.0f;
 }
 

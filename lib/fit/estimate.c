@@ -1,11 +1,12 @@
 #include "fit/estimate.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/sort.h"
+#include "fit/draws.h"
 #include "fit/smooth.h"
 #include "groom/strands.h"
 
@@ -23,19 +24,6 @@ static const float (*strand_of(const struct groom_fit *fit, uint32_t i))[3]
 static double length_of(const struct groom_fit *fit, uint32_t i)
 {
     return groom_polyline_length(strand_of(fit, i), fit->m) * fit->scale;
-}
-
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* Of n values, which it sorts; 0 of none. */
-static double median(double *values, uint32_t n)
-{
-    qsort(values, n, sizeof *values, compare_doubles);
-    return n ? values[n / 2] : 0;
 }
 
 /* --- scale -------------------------------------------------------------------------- */
@@ -62,7 +50,7 @@ static groom_status estimate_scale(const struct groom_fit *fit, const struct gro
             spread[n++] = sqrt(fmax(variance, 0)) / mean;
     }
     if (st == GROOM_OK)
-        estimates->scale = median(spread, n) / 0.5396;
+        estimates->scale = median_of_doubles(spread, n) / DRAWS_DEVIATION;
     memory_release(allocator, of, k, sizeof *of);
     memory_release(allocator, spread, k, sizeof *spread);
     return st;
@@ -94,7 +82,7 @@ static groom_status estimate_bend(const struct groom_fit *fit, const struct groo
     for (uint32_t i = 0; i < fit->n; i++)
         angle[i] = angle_of_ends(strand_of(fit, i),
                                  (const float (*)[3])(fit->centroids + (size_t)fit->cluster_of[i] * fit->m), fit->m);
-    estimates->bend_angle = median(angle, fit->n) * 6 / 5;
+    estimates->bend_angle = median_of_doubles(angle, fit->n) * 6 / 5;
     memory_release(allocator, angle, fit->n, sizeof *angle);
     return GROOM_OK;
 }

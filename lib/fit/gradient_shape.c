@@ -1,3 +1,4 @@
+#include "base/radix.h"
 #include "fit/gradient_shape.h"
 
 #include <cblas.h>
@@ -9,7 +10,6 @@
 #include "base/parallel.h"
 #include "fit/replay.h"
 #include "quality/loss_wasserstein.h"
-#include "quality/sort.h"
 #include "quality/waves.h"
 
 #define UNIT 0.1                   /* metres on an ordinary head */
@@ -55,8 +55,8 @@ static size_t slice_floats(uint32_t n) { return (size_t)2 * DIRECTIONS_PER_PIECE
 static double push_of(float *target, const float *fitted, uint32_t n, float *spare, uint64_t *order, float scale, float *push)
 {
     double sum = 0;
-    sort_floats(target, spare, n);
-    sort_order(fitted, order, order + n, n);
+    radix_sort_floats(target, spare, n);
+    radix_sort_order(fitted, order, order + n, n);
     for (uint32_t rank = 0; rank < n; rank++) {
         uint32_t i = (uint32_t)order[rank];
         float off = fitted[i] - target[rank];

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/parallel.h"
+#include "base/sort.h"
 #include "groom/spatial.h"
 #include "groom/strands.h"
 
@@ -71,12 +72,6 @@ static void sample_piece(void *user, uint32_t piece, uint32_t thread)
             sample_parts(c, i);
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* The length that few strands exceed. */
 static groom_status find_step(struct comparing *c, const struct groom_allocator *allocator)
 {
@@ -86,7 +81,7 @@ static groom_status find_step(struct comparing *c, const struct groom_allocator 
         return GROOM_ENOMEM;
     for (uint32_t i = 0; i < n; i++)
         length[i] = groom_polyline_length((const float (*)[3])(c->fit->target + (size_t)i * c->fit->m), c->fit->m);
-    qsort(length, n, sizeof *length, compare_doubles);
+    sort_doubles(length, n);
     c->step = length[(uint32_t)(LONGEST * (n - 1))] / (c->q - 1);
     memory_release(allocator, length, n, sizeof *length);
     return GROOM_OK;
@@ -185,7 +180,7 @@ static void find_rest(struct comparing *c, const struct groom_context *context)
     for (int round = 0; round < ROUNDS; round++) {
         parallel_for(context, (c->n_pairs + STRANDS_PER_PIECE - 1) / STRANDS_PER_PIECE, cost_piece, c);
         memcpy(c->sorted, c->cost, c->n_pairs * sizeof *c->sorted);
-        qsort(c->sorted, c->n_pairs, sizeof *c->sorted, compare_doubles);
+        sort_doubles(c->sorted, c->n_pairs);
         double usual = c->sorted[(uint32_t)(ALIKE * (c->n_pairs - 1))];
         if (!(usual > 0))
             return;

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/sort.h"
 #include "fit/dense.h"
 #include "fit/frame.h"
 #include "groom/strands.h"
@@ -33,12 +34,6 @@ static size_t guide_points(const struct groom *groom) { return (size_t)groom->n_
 static size_t points_of(const struct matching *matching) { return 2 * (size_t)matching->plan.n_pairs * matching->plan.m; }
 
 /* --- pairs ------------------------------------------------------------------------------ */
-
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
 
 /* The nearest neighbour that is no duplicate, else the farthest of those that were found, else the strand. */
 static uint32_t partner_of(uint32_t strand, const uint32_t *ids, const float *squared, float least)
@@ -74,8 +69,7 @@ static groom_status choose_partners(const struct groom_fit *fit, uint32_t n_pair
         usual = squared + (size_t)n_pairs * NEIGHBOURS;
         for (uint32_t i = 0; i < n_pairs; i++)
             usual[i] = squared[(size_t)i * NEIGHBOURS + NEIGHBOURS / 2];
-        qsort(usual, n_pairs, sizeof *usual, compare_floats);
-        float least = (float)DUPLICATE_SHARE * usual[n_pairs / 2];
+        float least = (float)DUPLICATE_SHARE * median_of_floats(usual, n_pairs);
         for (uint32_t i = 0; i < n_pairs; i++)
             strand[n_pairs + i] = partner_of(strand[i], ids + (size_t)i * NEIGHBOURS, squared + (size_t)i * NEIGHBOURS, least);
     }

@@ -1,11 +1,11 @@
 #include "fit/mean_strands.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/sort.h"
 
 #define STRANDS_PER_PIECE 128
 #define FARTHER_THAN_USUAL 4.0 /* times the median square distance from the target */
@@ -178,18 +178,11 @@ static void linearize_piece(void *user, uint32_t piece, uint32_t thread)
         linearize(job, i);
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* A strand's say falls from where it is farther off than usual. sorted [n] scratch */
 static void weigh_strands(struct mean_strands *mean, const double *error, double *sorted)
 {
     memcpy(sorted, error, mean->n * sizeof *sorted);
-    qsort(sorted, mean->n, sizeof *sorted, compare_doubles);
-    double usual = FARTHER_THAN_USUAL * sorted[mean->n / 2];
+    double usual = FARTHER_THAN_USUAL * median_of_doubles(sorted, mean->n);
     for (uint32_t i = 0; i < mean->n; i++) {
         float weight = error[i] > usual ? (float)sqrt(usual / error[i]) : 1;
         for (uint32_t p = 0; p < mean->n_parts; p++) {

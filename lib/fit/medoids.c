@@ -1,12 +1,12 @@
 #include "fit/medoids.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/progress.h"
+#include "base/sort.h"
 #include "geometry/kmeans.h"
 
 #define ROWS_PER_PIECE 16
@@ -144,12 +144,6 @@ static uint32_t pass(struct choice *c)
     return n_swaps;
 }
 
-static int compare_ids(const void *a, const void *b)
-{
-    uint32_t p = *(const uint32_t *)a, q = *(const uint32_t *)b;
-    return (p > q) - (p < q);
-}
-
 /* Rows at fewer than k places: the lowest rows that are none yet fill up. */
 static void fill_up(struct choice *c, uint32_t n_chosen)
 {
@@ -247,7 +241,7 @@ groom_status medoids_choose(const float *x, uint32_t n, uint32_t d, uint32_t k, 
     parallel_for(context, (n + ROWS_PER_PIECE - 1) / ROWS_PER_PIECE, distances_piece, &c);
     if ((st = improve(&c, max_passes, context, before, after, diag)) != GROOM_OK)
         goto out;
-    qsort(medoids, k, sizeof *medoids, compare_ids);
+    sort_indices(medoids, k);
 out:
     release(&c, allocator);
     return st;

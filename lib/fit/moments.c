@@ -6,6 +6,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/sort.h"
 #include "fit/correlation.h"
 #include "fit/dense.h"
 #include "model/kernel.h"
@@ -64,18 +65,6 @@ static double full_length(const float (*points)[3], uint32_t m)
 
 static uint32_t place(uint32_t p, uint32_t m) { return (uint32_t)((uint64_t)(p + 1) * (m - 1) / MOMENTS_PLACES); }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median(double *values, uint32_t n)
-{
-    qsort(values, n, sizeof *values, compare_doubles);
-    return values[n / 2];
-}
-
 groom_status moments_plan_init(struct moments_plan *plan, const struct groom_context *context, struct groom_diag *diag)
 {
     const struct groom_allocator *allocator = memory_allocator(context);
@@ -85,13 +74,13 @@ groom_status moments_plan_init(struct moments_plan *plan, const struct groom_con
         return groom_fail(diag, GROOM_ENOMEM, "no memory to compare %u pairs of strands", n);
     for (uint32_t i = 0; i < 2 * n; i++)
         values[i] = full_length(plan->base + (size_t)i * m, m);
-    double length = fmax(median(values, 2 * n), 1e-9);
+    double length = fmax(median_of_doubles(values, 2 * n), 1e-9);
     for (uint32_t i = 0; i < n; i++)
         values[i] = squared(plan->base[(size_t)i * m], plan->base[(size_t)(n + i) * m]);
-    plan->apart = fmax(median(values, n), DISTANCE_FLOOR * length * length);
+    plan->apart = fmax(median_of_doubles(values, n), DISTANCE_FLOOR * length * length);
     for (uint32_t i = 0; i < 2 * n; i++)
         values[i] = squared(plan->base[(size_t)i * m + middle], plan->guide[(size_t)i * m + middle]);
-    plan->off_guide = fmax(median(values, 2 * n), DISTANCE_FLOOR * length * length);
+    plan->off_guide = fmax(median_of_doubles(values, 2 * n), DISTANCE_FLOOR * length * length);
     for (int q = 0; q < N_FREQ; q++)
         plan->frequency[q] = LEAST_TURNS / length * pow(MOST_TURNS / LEAST_TURNS, (double)q / (N_FREQ - 1));
     memset(plan->level, 0, sizeof plan->level);

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "quality/sort.h"
+#include "base/radix.h"
 
 #define FAR_ROOT 8.0f   /* times the median distance of roots from their middle */
 #define FAR_REACH 4.0f  /* times what nine strands of ten reach, and */
@@ -16,7 +16,7 @@ struct sorting { float *values, *sorted, *spare; uint32_t n; };
 static float quantile(struct sorting *s, double q)
 {
     memcpy(s->sorted, s->values, s->n * sizeof *s->sorted);
-    sort_floats(s->sorted, s->spare, s->n);
+    radix_sort_floats(s->sorted, s->spare, s->n);
     return s->sorted[(uint32_t)(q * (s->n - 1))];
 }
 

@@ -1,3 +1,4 @@
+#include "base/sort.h"
 #include "fit/regions.h"
 
 #include <math.h>
@@ -146,12 +147,6 @@ static int compare_edges(const void *a, const void *b)
     return (x->b > y->b) - (x->b < y->b);
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Each pair once, the lower number first, at logarithmic costs. returns how many */
 static size_t tidy(const struct region_edge *edge, size_t n_edges, struct region_edge *out, double *scratch)
 {
@@ -167,7 +162,7 @@ static size_t tidy(const struct region_edge *edge, size_t n_edges, struct region
             scratch[kept] = out[e].cost;
             out[kept++] = out[e];
         }
-    qsort(scratch, kept, sizeof *scratch, compare_doubles);
+    sort_doubles(scratch, kept);
     double usual = kept ? scratch[(size_t)(USUAL * (double)(kept - 1))] : 0;
     for (size_t e = 0; e < kept; e++)
         out[e].cost = usual > 0 ? log(1 + out[e].cost / usual) : 0;

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/sort.h"
 
 #define NEAR 6            /* sites that a strand may belong to */
 #define MOST_STRANDS 64   /* a site, that are asked */
@@ -55,12 +56,6 @@ static void find_middles(struct siting *s)
         }
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 /* The usual distance from a middle to the next. nearest, squared: room for [n_sites][2] */
 static groom_status find_spacing(struct siting *s, const struct groom_neighbours *index, uint32_t *nearest, float *squared,
                                  const struct groom_context *context, struct groom_diag *diag)
@@ -70,8 +65,7 @@ static groom_status find_spacing(struct siting *s, const struct groom_neighbours
         return st;
     for (uint32_t o = 0; o < s->n_sites; o++)
         squared[o] = squared[2 * o + 1];
-    qsort(squared, s->n_sites, sizeof *squared, compare_floats);
-    s->spacing = s->n_sites >= FEWEST_SITES ? sqrt((double)squared[s->n_sites / 2]) : 0; /* of one site there is no next */
+    s->spacing = s->n_sites >= FEWEST_SITES ? sqrt((double)median_of_floats(squared, s->n_sites)) : 0; /* of one site there is no next */
     return GROOM_OK;
 }
 

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/sort.h"
 #include "fit/follow.h"
 #include "fit/strand_state.h"
 
@@ -27,12 +28,6 @@ struct strays {
 
 /* --- who strays ------------------------------------------------------------------------------- */
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 static void errors_of(struct random_search *search, const uint32_t *strand, uint32_t n, float *error,
                       const struct groom_context *context)
 {
@@ -54,8 +49,7 @@ static groom_status find_usual(struct random_search *search, float *usual, const
         for (uint32_t at = 0; at < n; at++)
             strand[at] = (uint32_t)((uint64_t)at * all / n);
         errors_of(search, strand, n, error, context);
-        qsort(error, n, sizeof *error, compare_floats);
-        *usual = error[n / 2];
+        *usual = median_of_floats(error, n);
     }
     memory_release(allocator, strand, n, sizeof *strand);
     memory_release(allocator, error, n, sizeof *error);

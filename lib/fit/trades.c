@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/sort.h"
 #include "fit/follow.h"
 
 #define NEAR 8      /* operator guides around a strand that it may follow next */
@@ -59,12 +60,6 @@ static void ask_strands(struct choosing *c, const struct groom_context *context)
 
 /* --- who trades ------------------------------------------------------------------------------------ */
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 static int compare_ranked(const void *a, const void *b)
 {
     const struct ranked *x = a, *y = b;
@@ -77,8 +72,7 @@ static double usual_error(struct choosing *c)
 {
     uint32_t n = c->groom->n_strands;
     memcpy(c->sorted, c->trades->error, n * sizeof *c->sorted);
-    qsort(c->sorted, n, sizeof *c->sorted, compare_floats);
-    return (double)c->sorted[n / 2];
+    return (double)median_of_floats(c->sorted, n);
 }
 
 static void make_accounts(struct choosing *c, double usual)

@@ -6,6 +6,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/sort.h"
 #include "fit/dense.h"
 #include "fit/simplex.h"
 #include "fit/strand_model.h"
@@ -97,18 +98,12 @@ static void fill_problem(const struct weighing *job, uint32_t at, struct workspa
     }
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* The k-th smallest squared distance of the strand from a candidate: from guides that are like it. */
 static double alike_of(const double *distance, uint32_t n, uint32_t k)
 {
     double sorted[SIMPLEX_MOST];
     memcpy(sorted, distance, n * sizeof *sorted);
-    qsort(sorted, n, sizeof *sorted, compare_doubles);
+    sort_doubles(sorted, n);
     return sorted[(k < n ? k : n) - 1];
 }
 
@@ -262,12 +257,6 @@ static void solve_piece(void *user, uint32_t piece, uint32_t thread)
 
 /* --- many ---------------------------------------------------------------------------------- */
 
-static double median(double *values, uint32_t n)
-{
-    qsort(values, n, sizeof *values, compare_doubles);
-    return n ? values[n / 2] : 0;
-}
-
 /* Of these strands; job's strand, sigma, noise, usual, left and alike are the caller's. */
 static groom_status weigh(struct weighing *job, const struct groom_neighbours *index, const struct groom_context *context,
                           struct weights_loss *loss, struct groom_diag *diag)
@@ -321,7 +310,7 @@ static groom_status find_sigma(struct weighing *job, const struct groom_neighbou
     if (st == GROOM_OK && !(job->sigma > 0)) {
         for (uint32_t g = 0; g < n; g++)
             spacing[g] = n > 1 ? sqrt(squared[2 * g + 1]) : 1;
-        job->sigma = SIGMA_IN_SPACINGS * median(spacing, n);
+        job->sigma = SIGMA_IN_SPACINGS * median_of_doubles(spacing, n);
     }
     job->sigma = fmax(job->sigma, 1e-9);
     memory_release(allocator, id, n, 2 * sizeof *id);
@@ -347,8 +336,8 @@ static groom_status find_noise(struct weighing *job, const struct groom_neighbou
         st = groom_fail(diag, GROOM_ENOMEM, "no memory to weigh the guides of %u strands", count);
     for (int round = 0; st == GROOM_OK && round < 2; round++) /* the ways' own strength needs the noise */
         if ((st = weigh(&sample, index, context, &loss, diag)) == GROOM_OK) {
-            sample.noise = job->noise = median(sample.left, count) / FREEDOMS;
-            sample.usual = job->usual = median(sample.alike, count);
+            sample.noise = job->noise = median_of_doubles(sample.left, count) / FREEDOMS;
+            sample.usual = job->usual = median_of_doubles(sample.alike, count);
         }
     memory_release(allocator, sample.left, count, sizeof *sample.left);
     memory_release(allocator, sample.alike, count, sizeof *sample.alike);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/sort.h"
 #include "groom/spatial.h"
 
 #define FEWEST_ROOTS 16
@@ -89,18 +90,6 @@ static double uv_between(const struct samples *s, uint32_t i, uint32_t j)
     return hypot((double)s->uvs[i][0] - s->uvs[j][0], (double)s->uvs[i][1] - s->uvs[j][1]);
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
-static double median(double *values, size_t n)
-{
-    qsort(values, n, sizeof *values, compare_doubles);
-    return values[n / 2];
-}
-
 /* Scales of the pairs of neighbours on the scalp; how far the nearest other place is. */
 static size_t gather_scales(struct samples *s)
 {
@@ -165,14 +154,14 @@ groom_status uv_judge(const float (*points)[3], const float (*uvs)[2], uint32_t 
     n_pairs = gather_scales(&s);
     if (n_pairs < FEWEST_ROOTS)
         goto out;
-    scale = median(s.scales, n_pairs);
+    scale = median_of_doubles(s.scales, n_pairs);
     judgement->verdict = scale > 0 ? judge_scales(s.scales, n_pairs, scale) : UV_NO_AREA;
     if (judgement->verdict != UV_SERVES)
         goto out;
     judgement->metres = 1 / scale;
     if ((st = find_neighbours(&s, (const float *)s.uvs, 2, context, diag)) != GROOM_OK)
         goto out;
-    if (is_stacked(&s, scale, median(s.nearest, s.n)))
+    if (is_stacked(&s, scale, median_of_doubles(s.nearest, s.n)))
         judgement->verdict = UV_STACKED;
 out:
     samples_finish(&s, allocator);

@@ -1,9 +1,9 @@
 /* Guides near each root and their weights: Chang et al. 2025, Eq. 3. */
 #include <math.h>
-#include <stdlib.h>
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/sort.h"
 #include "groom/groom.h"
 #include "model/uv_grid.h"
 
@@ -17,12 +17,6 @@ struct instancing {
     double *squared;  /* [threads * k] */
 };
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* The median distance of a guide to its nearest guide; 0 where there is only one. */
 static groom_status median_spacing(const struct uv_grid *grid, double *spacing)
 {
@@ -32,8 +26,7 @@ static groom_status median_spacing(const struct uv_grid *grid, double *spacing)
         return GROOM_ENOMEM;
     for (uint32_t g = 0; g < grid->n_points; g++)
         n += uv_grid_nearest(grid, grid->points[g], 1, g, &nearest, &squared[n]);
-    qsort(squared, n, sizeof *squared, compare_doubles);
-    *spacing = n ? sqrt(squared[n / 2]) : 0.0;
+    *spacing = sqrt(median_of_doubles(squared, n));
     memory_release(grid->allocator, squared, grid->n_points, sizeof *squared);
     return GROOM_OK;
 }

@@ -1,3 +1,4 @@
+#include "base/radix.h"
 #include "quality/half.h"
 
 #include <math.h>
@@ -6,7 +7,6 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "quality/loss_wasserstein.h"
-#include "quality/sort.h"
 
 #define UNIT 0.1              /* metres, of segments and spectra */
 #define STREAM_SLICES 0x71750001u
@@ -114,9 +114,9 @@ groom_status quality_half_init(struct quality_half *half, const struct quality_s
     spare = memory_array(allocator, half->n_curvatures, sizeof *spare);
     if (half->curvature && half->torsion && half->length && spare) {
         parallel_for(context, pieces_of(n), measure_piece, half);
-        sort_floats(half->curvature, spare, half->n_curvatures);
-        sort_floats(half->torsion, spare, half->n_torsions);
-        sort_floats(half->length, spare, n);
+        radix_sort_floats(half->curvature, spare, half->n_curvatures);
+        radix_sort_floats(half->torsion, spare, half->n_torsions);
+        radix_sort_floats(half->length, spare, n);
     } else {
         st = groom_fail(diag, GROOM_ENOMEM, "no memory to measure %u strands", n);
     }

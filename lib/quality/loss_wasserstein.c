@@ -7,7 +7,7 @@
 #include "base/blas.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "quality/sort.h"
+#include "base/radix.h"
 #include "quality/waves.h"
 
 #define DIRECTIONS_PER_PIECE 16
@@ -54,8 +54,8 @@ static void slice_piece(void *user, uint32_t piece, uint32_t thread)
     for (uint32_t k = 0; k < count; k++) {
         float *p = of_a + (size_t)k * job->n, *q = of_b + (size_t)k * job->n;
         double sum = 0;
-        sort_floats(p, spare, job->n);
-        sort_floats(q, spare, job->n);
+        radix_sort_floats(p, spare, job->n);
+        radix_sort_floats(q, spare, job->n);
         for (uint32_t i = 0; i < job->n; i++)
             sum += ((double)p[i] - q[i]) * ((double)p[i] - q[i]);
         job->sums[first + k] = sum;

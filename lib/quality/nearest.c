@@ -5,7 +5,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "quality/sort.h"
+#include "base/radix.h"
 
 #define PLACES_PER_PIECE 1024u
 #define DEGREE (3.14159265358979323846 / 180)
@@ -68,7 +68,7 @@ static void summarize(const struct asking *job, uint32_t n_pieces, float *spare,
         }
     for (uint32_t k = 0; k < n; k++)
         sum += job->distance[k];
-    sort_floats(job->distance, spare, n);
+    radix_sort_floats(job->distance, spare, n);
     result->nearest.mean = sum / n;
     result->nearest.p95 = job->distance[(uint32_t)(0.95 * (n - 1) + 0.5)];
     for (int k = 0; k < GROOM_QUALITY_TOLERANCES; k++) {

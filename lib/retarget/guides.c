@@ -1,11 +1,11 @@
 /* Guides: k-means over strands, and of each cluster the strand nearest to its centre (Wang et al. 2009, as
  * Section 5 asks for). A strand is its points at SAMPLES shares of its arc length. */
 #include <math.h>
-#include <stdlib.h>
 
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/progress.h"
+#include "base/sort.h"
 #include "geometry/kmeans.h"
 #include "retarget/source.h"
 
@@ -76,12 +76,6 @@ static void middles(const float *rows, uint32_t n, const float *centres, const u
     }
 }
 
-static int compare_indices(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return x < y ? -1 : x > y;
-}
-
 struct clusters {
     uint32_t wanted, k, *chosen, *cluster_of;
     float *rows, *centres;
@@ -117,7 +111,7 @@ static groom_status take_middles(struct groom_retarget_source *source, struct cl
     for (uint32_t i = 0; i < c->k; i++)
         c->chosen[i] = UINT32_MAX;
     middles(c->rows, source->strands->n_strands, c->centres, c->cluster_of, c->best, c->chosen, c->k);
-    qsort(c->chosen, c->k, sizeof *c->chosen, compare_indices);
+    sort_indices(c->chosen, c->k);
     while (c->k > 1 && c->chosen[c->k - 1] == UINT32_MAX)
         c->k--;
     if (!(source->guides = memory_array(source->allocator, c->k, sizeof *source->guides)))

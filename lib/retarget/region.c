@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/sort.h"
 #include "retarget/region.h"
 
 #define SPACINGS 3.0         /* of roots: gaps up to twice so many are closed */
@@ -36,12 +37,6 @@ static groom_status host_roots(struct groom_scalp_region *region, const float (*
     return GROOM_OK;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    const float *p = a, *q = b;
-    return *p < *q ? -1 : *p > *q;
-}
-
 /* The median distance from a root to the next at another place. */
 static groom_status find_spacing(const float (*roots)[3], uint32_t n, const struct groom_context *context, double *spacing,
                                  struct groom_diag *diag)
@@ -58,8 +53,7 @@ static groom_status find_spacing(const float (*roots)[3], uint32_t n, const stru
         for (uint32_t i = 0; i < n; i++)
             if (squared[2 * i + 1] > 0 && isfinite(squared[2 * i + 1]))
                 squared[kept++] = squared[2 * i + 1];
-        qsort(squared, kept, sizeof *squared, compare_floats);
-        *spacing = kept ? sqrt(squared[kept / 2]) : 0;
+        *spacing = sqrt(median_of_floats(squared, kept));
     }
     groom_neighbours_destroy(neighbours);
     memory_release(allocator, ids, (size_t)2 * n, sizeof *ids);

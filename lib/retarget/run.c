@@ -7,6 +7,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/progress.h"
+#include "base/sort.h"
 #include "groom/body.h"
 #include "retarget/job.h"
 
@@ -326,12 +327,6 @@ static void to_metres(const struct job *job, float (*points)[3])
     }
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return x < y ? -1 : x > y;
-}
-
 static groom_status measure_lengths(const struct job *job, const float (*points)[3], struct groom_diag *diag)
 {
     const struct groom_strands *strands = job->source->strands;
@@ -344,7 +339,7 @@ static groom_status measure_lengths(const struct job *job, const float (*points)
         double was = groom_polyline_length((const float(*)[3])strands->points + first, n);
         ratio[i] = was > 0 ? (float)(groom_polyline_length(points + first, n) / was) : 1;
     }
-    qsort(ratio, strands->n_strands, sizeof *ratio, compare_floats);
+    sort_floats(ratio, strands->n_strands);
     report->length_ratio_min = ratio[0];
     report->length_ratio_median = ratio[strands->n_strands / 2];
     report->length_ratio_max = ratio[strands->n_strands - 1];

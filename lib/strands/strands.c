@@ -2,11 +2,11 @@
 #include "groom/strands.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/sort.h"
 
 /* Strands a piece of a parallel loop: enough to be worth a hand-over, fixed so that results are. */
 #define STRANDS_PER_PIECE 256
@@ -208,15 +208,9 @@ static void measure_piece(void *user, uint32_t piece, uint32_t thread)
     }
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 static void summarize_lengths(float *length, uint32_t n, struct groom_strands_summary *summary)
 {
-    qsort(length, n, sizeof *length, compare_floats);
+    sort_floats(length, n);
     summary->length_min = length[0];
     summary->length_median = (length[(n - 1) / 2] + length[n / 2]) / 2;
     summary->length_max = length[n - 1];

@@ -7,6 +7,7 @@
 #include "base/blas.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/sort.h"
 #include "groom/random.h"
 #include "tests/support/test.h"
 
@@ -153,6 +154,26 @@ START_TEST(random_numbers_have_their_moments)
 }
 END_TEST
 
+START_TEST(numbers_are_sorted_and_the_middle_one_is_the_median)
+{
+    float floats[5] = {3, -1, 2, 2, -7};
+    double doubles[4] = {4, 1, 3, 2};
+    uint32_t indices[3] = {UINT32_MAX, 0, 7};
+    sort_floats(floats, 5);
+    sort_doubles(doubles, 4);
+    sort_indices(indices, 3);
+    for (int k = 0; k < 4; k++)
+        ck_assert_float_le(floats[k], floats[k + 1]);
+    for (int k = 0; k < 4; k++)
+        ck_assert_double_eq(doubles[k], k + 1);
+    ck_assert(indices[0] == 0 && indices[1] == 7 && indices[2] == UINT32_MAX);
+    ck_assert_float_eq(median_of_floats((float[]){9, 1, 5}, 3), 5);
+    ck_assert_double_eq(median_of_doubles((double[]){4, 1, 3, 2}, 4), 3); /* the upper one of two */
+    ck_assert_float_eq(median_of_floats(floats, 0), 0);
+    ck_assert_double_eq(median_of_doubles(doubles, 0), 0);
+}
+END_TEST
+
 TEST_SUITE("base", every_status_has_a_name_and_a_message, fail_fills_the_diag_and_returns_the_status,
            array_refuses_what_overflows,
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
@@ -160,4 +181,4 @@ TEST_SUITE("base", every_status_has_a_name_and_a_message, fail_fills_the_diag_an
 #endif
            parallel_for_visits_each_piece_once,
            a_loop_inside_a_loop_runs_in_its_thread, random_block_depends_on_each_of_its_inputs,
-           random_numbers_have_their_moments)
+           random_numbers_have_their_moments, numbers_are_sorted_and_the_middle_one_is_the_median)

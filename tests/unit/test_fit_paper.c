@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/radix.h"
 #include "fit/gradient_determinant.h"
 #include "fit/gradient_filter.h"
 #include "fit/gradient_shape.h"
@@ -11,7 +12,6 @@
 #include "fit/paper_guides.h"
 #include "fit/paper_operators.h"
 #include "groom/strands.h"
-#include "quality/sort.h"
 #include "tests/support/fits.h"
 #include "tests/support/guides.h"
 #include "tests/support/test.h"
@@ -135,7 +135,7 @@ START_TEST(floats_are_ordered_by_size_then_place)
     const float values[] = {3, -1, 0, 3, -7, 1e-20f, -0.5f};
     uint64_t order[7], spare[7];
     const uint32_t expected[] = {4, 1, 6, 2, 5, 0, 3};
-    sort_order(values, order, spare, 7);
+    radix_sort_order(values, order, spare, 7);
     for (int i = 0; i < 7; i++)
         ck_assert_uint_eq((uint32_t)order[i], expected[i]);
 }
