@@ -16,6 +16,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "base/progress.h"
 #include "fit/bundles.h"
 #include "fit/guide_laplacian.h"
@@ -27,6 +28,7 @@
 #include "fit/roughness.h"
 #include "fit/sites.h"
 #include "fit/state.h"
+#include "geometry/side.h"
 
 enum phase { SOLVE, ASSIGN, ENDED };
 
@@ -66,7 +68,7 @@ struct solution {
     double *partial;        /* of the loss */
     float (*direction)[3];  /* [n_guides] at the root, unit */
     float (*point)[3];      /* [n_guides * m] metres */
-    struct groom_surface_point *surface; /* [n_guides * m] nearest to them */
+    struct groom_surface_point *surface; /* [n_guides * m] nearest to those that are in the head */
 };
 
 /* --- shapes ------------------------------------------------------------------------------ */
@@ -236,14 +238,30 @@ static void hold_at(struct solution *solution, uint32_t g, uint32_t j, const flo
                                                  solution->move[g][c]);
 }
 
-/* By the side of the nearest face, which is quick, and, of those, by what winds around. */
-static int is_in_head(const struct groom_fit *fit, const float p[3], const struct groom_surface_point *surface,
-                      float clearance)
+/* Whether the surface turns its back on a point. */
+static int is_behind(const struct groom_surface_point *surface, const float p[3])
 {
     float side = 0;
     for (int c = 0; c < 3; c++)
         side += (p[c] - surface->position[c]) * surface->normal[c];
-    return side < 0 && surface->distance > clearance && groom_bvh_inside(fit->bvh, p);
+    return side < 0;
+}
+
+/* Where vertices of a guide that are deep in the head come out of it; at a distance of 0 where they are not. */
+static void look_at_guide(void *user, uint32_t g, uint32_t thread)
+{
+    const struct solution *solution = user;
+    const struct groom_bvh *head = solution->fit->bvh;
+    size_t first = (size_t)g * solution->fit->m;
+    const float (*x)[3] = (const float (*)[3])(solution->point + first);
+    struct side_walk walk = side_walk_begin(head);
+    (void)thread;
+    points_of(solution, g, solution->point + first);
+    for (uint32_t j = 1; j < solution->fit->m; j++) {
+        struct groom_surface_point *out = &solution->surface[first + j];
+        if (!side_walk(&walk, x[j]) || !groom_bvh_closest(head, x[j], INFINITY, out) || !is_behind(out, x[j]))
+            out->distance = 0;
+    }
 }
 
 /* Holds vertices that are deep in the head at the nearest point of its surface; returns how many. */
@@ -252,15 +270,11 @@ static uint32_t hold_out_of_head(struct solution *solution, const struct groom_c
     const struct groom_fit *fit = solution->fit;
     float clearance = (float)fit->options.stages.initialize.head_clearance * fit->ordinary;
     uint32_t n_held = 0;
-    for (uint32_t g = 0; g < fit->n_guides; g++)
-        points_of(solution, g, solution->point + (size_t)g * fit->m);
-    groom_bvh_closest_points(fit->bvh, (const float (*)[3])solution->point, fit->n_guides * fit->m, solution->surface,
-                             context);
+    parallel_for(context, fit->n_guides, look_at_guide, solution);
     for (uint32_t g = 0; g < fit->n_guides; g++)
         for (uint32_t j = 1; j < fit->m; j++) {
             size_t v = (size_t)g * fit->m + j;
-            if (solution->system.hold[v] == 0 &&
-                is_in_head(fit, solution->point[v], &solution->surface[v], clearance) &&
+            if (solution->system.hold[v] == 0 && solution->surface[v].distance > clearance &&
                 !strands_are_in(solution, g, j, clearance)) {
                 hold_at(solution, g, j, solution->surface[v].position);
                 n_held++;
